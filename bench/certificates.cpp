@@ -255,7 +255,7 @@ private:
     std::vector<State> hard_;
 };
 
-/// Share of the states beyond `far` that the certificate clears.
+/// Fraction of the states beyond `far` that the certificate clears.
 double cleared_share(const Scene& scene, const Model& model)
 {
     const CertifiedClassifier certified(model);

@@ -11,7 +11,7 @@
 
 namespace ricochet::bench {
 
-/// One way to look at a guard, on one run.
+/// One way of checking a guard, measured on one run.
 struct Way {
     std::string name;
     double time = 0;   ///< [s] a step, with the guard as it is
@@ -79,7 +79,7 @@ template <class System>
 void write_map(const std::string& file, const std::vector<Regime>& regimes,
                const std::vector<double>& prices);
 
-/// Of the ways that keep the events (or of all), the cheapest; the first where two are equal.
+/// The cheapest of all ways, or of those that keep the events; of equal ones the first.
 [[nodiscard]] const Way& best_way(const Regime& regime, double price, bool only_same);
 
 }  // namespace ricochet::bench

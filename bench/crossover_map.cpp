@@ -1,4 +1,4 @@
-// A map of who wins, written as SVG.
+// Writes a map of the fastest way of checking a guard, as SVG.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -3,7 +3,7 @@
 //
 //     step/<system>/<method>/<state type, of rk4>/<detector>
 //
-//     scene/<system>/<search>/<detector>      guards that are dear: 2 s of rk4 at 1 ms
+//     scene/<system>/<search>/<detector>      expensive guards: 2 s of rk4 at 1 ms
 //
 // Networks are named by their hidden layers: 1x16 is the any-step model of the ball,
 // 5x16 the one for steps of 0.01 s. `line` is the rival that knows the boundary.

@@ -1,8 +1,8 @@
 // The rival that needs no library but Boost: odeint's own loop, with a sign check
 // after each step and bisection inside it, as a competent user writes it.
 //
-// It is compiled in a file of its own, so that what stands around it does not
-// change how well it is optimised.
+// It is compiled in a file of its own, so that surrounding code does not change
+// how well it is optimised.
 #pragma once
 
 #include <array>

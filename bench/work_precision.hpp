@@ -104,7 +104,7 @@ public:
 
     [[nodiscard]] const std::vector<Case>& all() const noexcept { return cases_; }
 
-    /// Those for which `wanted(case)`.
+    /// The cases for which `wanted(case)` is true.
     template <class Predicate>
     [[nodiscard]] std::vector<Case> select(Predicate wanted) const
     {

@@ -43,8 +43,8 @@ struct Result {
     std::string err;
 };
 
-/// Waits until the process has a handler of its own for the signal, which it installs when its
-/// work begins; then for `work`, so that there is a result to keep.
+/// Waits until the process has installed its handler of the signal, as it does when its work
+/// begins, and then for the duration `work`, so that there is a result to keep.
 inline void wait_for_handler(pid_t child, int signal, std::chrono::milliseconds work)
 {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds(60);

@@ -1,4 +1,4 @@
-// Systems whose events come in clusters or all at once.
+// Systems whose events are clustered or simultaneous.
 #pragma once
 
 #include <array>

@@ -171,7 +171,7 @@ private:
         return out;
     }
 
-    /// Goes from here to the next set, the next time event or the end.
+    /// Advances to the next fired set, the next time event or the end.
     void fly()
     {
         const std::array<Cubic, 3> x = motion();

@@ -4,14 +4,14 @@
 //
 //     v' = tau - K u - H u' - friction,      u = d - v_pl t,
 //
-// multiplied with v and integrated says that the work of the load, which is that of the initial
-// stress and of the plates that move at v_pl, is stored as motion and strain, or lost to friction
-// and to radiation:
+// multiplied by v and integrated, gives the balance of energy: the work of the initial stress and
+// of the plates, which move at v_pl, is stored as motion and strain, or lost to friction and
+// radiation:
 //
 //     tau.d - v_pl 1.(int K u + H u' dt) = v.v / 2 + u.K u / 2 + int friction.v dt + int u'.H u' dt
 //
-// K and its root are matrices here, and friction is integrated from the motion alone, so that
-// the integrator's own sums are not used.
+// K and its root are matrices here, and friction is integrated from the motion alone, and
+// not taken from the sums of the integrator.
 #pragma once
 
 #include <Eigen/Eigenvalues>

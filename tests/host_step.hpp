@@ -1,4 +1,4 @@
-// A step that is not ours: the data that a host integrator would offer to the detectors and
+// A step of a host integrator: the data that the host would offer to the detectors and
 // locators. The state is (s, g(s)) of a function g given in closed form.
 #pragma once
 

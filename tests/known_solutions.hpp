@@ -111,7 +111,7 @@ template <class Array>
     return out;
 }
 
-/// The happenings nth(0), nth(1), ... up to `t_end`.
+/// The events nth(0), nth(1), ... of a known solution up to `t_end`.
 template <class Function>
 [[nodiscard]] std::vector<Happening> happenings(double t_end, const Function& nth)
 {

@@ -78,7 +78,7 @@ struct Expected {
             out.state_doubt = std::max(out.state_doubt, std::fabs(other.x[c] - out.run.x[c]));
         }
     }
-    // Not worth following: a billionth has grown to a hundred-thousandth.
+    // Too sensitive to compare: a disturbance of 1e-9 has grown to more than 1e-5.
     if (!out.doubt.empty() && out.doubt.back() > 1e-5L) return std::nullopt;
     return out;
 }

@@ -12,8 +12,8 @@ namespace ricochet::testing_support {
 /// 1 to `most` contacts of 2 or 3 components between bodies of three degrees of freedom,
 /// whose masses differ by up to 1e8, or between one and the ground. Bodies are few, so that
 /// there are often more contacts than degrees of freedom, and some contacts occur
-/// twice. Friction is in [0, 2]. q is that of free bodies at random velocities,
-/// so that impulses exist that stop them.
+/// twice. Friction is in [0, 2]. q holds the contact velocities of free bodies in
+/// random motion, so that impulses that stop the bodies exist.
 class RandomContacts {
 public:
     explicit RandomContacts(unsigned seed) : random_(seed) {}

@@ -88,7 +88,7 @@ void follow_mechanism(const System& system, const typename TimeStepping<System>:
         const double kinetic = 0.5 * (now.v - before.v).dot(mass * (now.v + before.v));
         const double load = 0.5 * h * force.dot(before.v + now.v);
         const double contacts = 0.5 * now.impulse.dot(u0 + u1);
-        // Their work beyond returning the work that the load does against them in the step.
+        // Work of the contacts, less what only returns the work of the load against them.
         const double dissipated = contacts + 0.5 * now.impulse.dot(directions * free);
         const double terms =
             0.5 * (now.v.cwiseAbs() + before.v.cwiseAbs())

@@ -45,7 +45,7 @@ struct QuadLaw {
         const Quad u = w(xi);
         return v * v / (sqrt(v * v + u * u) + u);
     }
-    /// The two sides of which xi' D_RS is the difference.
+    /// The two terms whose difference is xi' D_RS.
     [[nodiscard]] Quad healing(const Quad& v, const Quad& xi) const
     {
         return evolution == StateEvolution::slip

@@ -11,7 +11,7 @@
 
 namespace ricochet::test {
 
-/// A ball that keeps four fifths of its speed.
+/// A bouncing ball with restitution 0.8.
 struct Ball {
     using State = std::array<double, 2>;
     bool unilateral = true;
@@ -20,10 +20,10 @@ struct Ball {
     void reset(double, State& x) const { x = {0, -0.8 * x[1]}; }
 };
 
-/// The same of another type.
+/// The same system as another type.
 struct Droplet : Ball {};
 
-/// After nine steps from 1 m at rest.
+/// A snapshot of the ball nine steps after its start from 1 m at rest.
 [[nodiscard]] inline Snapshot saved_ball(const Options& options)
 {
     const Ball ball;

@@ -30,7 +30,7 @@ int guard(double t, N_Vector x, double* g, void* ball)
     return 0;
 }
 
-/// A solver that is set up once and started anew for every run, as CVODE intends.
+/// A solver that is allocated once and reinitialised for every run, as CVODE recommends.
 class CvodeBall {
 public:
     CvodeBall(const BallProblem& problem, double tolerance) : problem_(problem)

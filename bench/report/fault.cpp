@@ -127,7 +127,7 @@ private:
     Eigen::VectorXd stress_;
 };
 
-/// As its manual says: a dense Jacobian by differences.
+/// As CVODE's manual recommends: a dense Jacobian by differences.
 [[nodiscard]] Answer by_cvode(const FaultSystem& system, double tolerance)
 {
     Mode mode{};

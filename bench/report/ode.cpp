@@ -1,7 +1,7 @@
 // The Open Dynamics Engine: bodies above planes, contacts by its collision spaces, steps of
-// constant length by its exact solver, and by its iterative one for the gas, as its manual says of
-// many bodies. An impact is the step in which the velocity turns, a collision one in which a pair
-// overlaps and approaches.
+// constant length by its exact solver, and by its iterative one for the gas, as its manual advises
+// for many bodies. An impact is the step in which the velocity turns; a collision is a step in
+// which a pair overlaps and approaches.
 #include <ode/ode.h>
 
 #include <cmath>

@@ -1,5 +1,5 @@
-// Cost of features: the bouncing ball with one feature added. The program is compiled once for
-// each, so that its size and its allocations show what the feature brings along.
+// Cost of features: the bouncing ball with one feature added. The program is compiled once per
+// feature, so that its size and its allocations show the cost of that feature.
 //
 // It prints one line of JSON: seconds of a run, allocations in a run, events.
 #include <algorithm>

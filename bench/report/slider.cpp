@@ -98,8 +98,8 @@ int level_of(double t, N_Vector x, double* g, void* user)
     return 0;
 }
 
-/// As its manual says: a dense Jacobian by differences, one root in either direction, which is
-/// only recorded.
+/// As CVODE's manual recommends: a dense Jacobian by differences, one root in either direction,
+/// which is only recorded.
 Answer by_cvode(double tolerance)
 {
     Mode mode{};

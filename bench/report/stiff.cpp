@@ -150,7 +150,7 @@ private:
         return false;
     }
 
-    /// Goes to the crossing in the next step of length j, a bit of its time after another.
+    /// Advances to the crossing in the next step of length j, by bisection.
     void descend(std::size_t j)
     {
         for (++j; j <= Propagators::halvings; ++j) {

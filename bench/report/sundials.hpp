@@ -65,7 +65,7 @@ public:
 };
 
 /// Goes from event to event: `to(t_end, t)` continues, `fired(which)` are the flags of the guards
-/// after a root, `again(t)` starts anew after a reset.
+/// after a root, `again(t)` reinitialises the solver after a reset.
 template <class S, class To, class Fired, class Again>
 bool drive(Seen<S>& system, const Task<S>& task, N_Vector state, Answer& answer, std::size_t offset,
            int root_flag, const To& to, const Fired& fired, const Again& again)

@@ -7,8 +7,8 @@
 // of duals, Dual<1, Dual<1>>, have second derivatives.
 //
 // Functions are found by argument-dependent lookup: `using std::cos; cos(x)`. Comparisons compare
-// the values; where a function has a kink, its derivative is that of the branch that the value
-// takes.
+// the values; where a function has a kink, it has the derivative of the branch on which the
+// value lies.
 #pragma once
 
 #include <array>
@@ -244,7 +244,7 @@ struct Dual {
     {
         return fabs(a);
     }
-    /// A piecewise constant function: its derivative is 0 wherever it exists.
+    /// Rounds down. The function is piecewise constant: its derivative is 0 wherever it exists.
     friend constexpr Dual floor(const Dual& a)
     {
         using std::floor;

@@ -47,7 +47,7 @@ class LaneResults {
 public:
     explicit LaneResults(std::size_t rows) { out_.rows.resize(rows); }
 
-    /// Calls `run()` for a row, and keeps what it throws. False: it has thrown.
+    /// Calls `run()` for a row, and keeps the exception that it throws. False: it has thrown one.
     template <class Function>
     bool attempt(std::size_t row, const Function& run)
     {
@@ -246,7 +246,7 @@ inline constexpr bool runs_in_lanes = detail::fits_lanes<System, X>();
 /// runs are computed alone, since their bits would differ. For several threads, give blocks of
 /// starts to `ensemble`.
 ///
-/// @param options  apply to all runs; those that `cancelled` ends have that outcome
+/// @param options  for all runs; runs ended by `cancelled` have that outcome
 template <class System, class X = typename System::State, class Detector = Extremum,
           class Locator = Newton>
 requires Flowing<System, X> && StateVector<X>

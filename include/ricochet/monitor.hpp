@@ -223,12 +223,12 @@ public:
     explicit EventMonitor(System&&, const X&, const MonitorOptions& = {}, const Detector& = {},
                           const Locator& = {}) = delete;
 
-    /// Arms all guards at a state that no event has led to: at the start, and after the host has
-    /// changed the state. May return a cut immediately: a guard that is about to be crossed.
+    /// Arms all guards at a state that no event has produced: at the start, and after the host has
+    /// changed the state. May return a cut immediately, for a guard that is about to be crossed.
     /// @param dxdt   the rate at x in offsets, n doubles
     /// @param scale  [s] approximate length of the next step
-    /// @throws std::invalid_argument naming a guard that is not finite, or behind a surface that
-    /// bounds the motion.
+    /// @throws std::invalid_argument for a time, state, scale or guard that is not finite, an array
+    /// of the wrong size, an unknown mode, or a state behind a surface that bounds the motion.
     Verdict start(const Instant& t, std::span<const double> x, std::span<const double> dxdt,
                   double scale, Mode mode = 0)
     {
@@ -275,7 +275,7 @@ public:
     }
     /// The same, with the rate of the system's flow.
     [[nodiscard]] Verdict resume(double scale) { return monitor_->resume(nullptr, scale); }
-    /// After a cut, from a state that the host chooses instead of `cut().after`.
+    /// The same, from a state that the host chooses instead of `cut().after`.
     [[nodiscard]] Verdict resume(std::span<const double> after, Mode mode,
                                  std::span<const double> dxdt, double scale)
     {
@@ -298,7 +298,7 @@ public:
 
     /// Time [s] up to which no guard needs a check, by the bounds that the system declares or a
     /// gate (`Planned`, `Certified`, ...): the host may go there in steps that it does not show, by
-    /// `skip_to`. Without bounds it is the current time.
+    /// `skip_to`. Without bounds or a gate it is the current time.
     [[nodiscard]] double quiet_until() const noexcept { return monitor_->quiet_until(); }
 
     /// Tells the monitor that the host has continued to t, at most `quiet_until` and before the

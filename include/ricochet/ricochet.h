@@ -1,30 +1,30 @@
 /* ricochet for C: hybrid systems, that is smooth motion with events, resets and modes.
  *
- *     rc_system        the functions of a system, as pointers, and what is said of its guards
- *     rc_simulation    a run of it, taken in steps, from event to event, or to the end
- *     rc_monitor       its events in the steps of an integrator of the program's own
+ *     rc_system        the functions of a system, as pointers, and the properties of its guards
+ *     rc_simulation    one run of a system, advanced by steps, from event to event, or to the end
+ *     rc_monitor       the events of a system in the steps of the program's own integrator
  *
  * Link with the shared library ricochet_c (`ricochet::c` in CMake, `ricochet-c` in pkg-config).
  * C99; the same from C++. docs/c.md is the guide, examples/c/ has whole programs.
  *
  * Times are in seconds. A state is an array of n doubles, where n is the dimension of the system.
  *
- * Results. Every function that can fail returns an rc_status, RC_OK for success; those that
- * return what is asked for name the value that means failure. After a failure `rc_last_error()`
- * is a sentence about it. What becomes of the motion (it reached its end, its events accumulated,
- * no step met the tolerance) is no failure: it is the outcome of the run, `rc_outcome()`.
+ * Results. Functions that can fail return an rc_status, RC_OK for success; those that return a
+ * value instead document which value means failure. After a failure
+ * `rc_last_error()` says in a sentence what went wrong. How a motion ends (at its end time, at an
+ * accumulation of events, because no step met the tolerance) is not a failure: see `rc_outcome()`.
  *
- * Structs that go in or come out have their own size first, as the program was compiled with it.
- * A library that is newer than the program takes the fields it does not find as zero, or an
- * option at its default; an older one refuses the struct as RC_WRONG_SIZE.
+ * Every struct that is passed in or out begins with its own size, as the program was compiled.
+ * A library newer than the program takes the fields that are missing as zero, or as an option
+ * at its default; an older library refuses the struct with RC_WRONG_SIZE.
  *
- * Threads. One simulation, or monitor, belongs to one thread at a time: a call while another is in
- * progress, from another thread or from a callback, is refused as RC_BUSY; `rc_cancel` is the
- * exception. Different ones may run at the same time, also of one system, if its callbacks allow
- * it.
+ * Threads. A simulation or monitor belongs to one thread at a time: a call made while another is
+ * in progress, from another thread or from a callback, is refused with RC_BUSY, except for
+ * `rc_cancel`. Different simulations and monitors may run at the same time, even of one system,
+ * if its callbacks allow it.
  *
- * Handles. A handle that is null, freed or of another kind is refused as RC_BAD_HANDLE. A freed
- * handle is recognised for certain in debug builds of the library, which keep its memory.
+ * Handles. A handle that is null, freed or of another kind is refused with RC_BAD_HANDLE. Only
+ * debug builds of the library, which keep its memory, are certain to recognise a freed handle.
  */
 #ifndef RICOCHET_RICOCHET_H
 #define RICOCHET_RICOCHET_H
@@ -57,11 +57,11 @@ typedef enum rc_status {
     RC_OUT_OF_TURN = 8 /**< not what the monitor expects next; nothing has changed */
 } rc_status;
 
-/** The last failure in this thread as a sentence that says what was given and what was expected;
- *  empty if there was none. Until the next failure in this thread. */
+/** Message of the last failure in this thread: what was given and what was expected; empty if
+ *  there was none. Valid until the next failure in this thread. */
 RC_API const char* rc_last_error(void);
 
-/** The name of a status, e.g. "RC_BUSY"; "unknown" for a number that is none. */
+/** The name of a status, e.g. "RC_BUSY"; "unknown" for any other number. */
 RC_API const char* rc_status_name(rc_status status);
 
 /** The version of the library, e.g. "0.1.0". */
@@ -69,8 +69,8 @@ RC_API const char* rc_version(void);
 
 /* --- systems ----------------------------------------------------------------------------- */
 
-/** A hybrid system: callbacks and what is said of its guards. Immutable, so that simulations and
- *  threads share it. */
+/** A hybrid system: its callbacks and the properties of its guards. Immutable, so that
+ *  simulations and threads may share it. */
 typedef struct rc_system rc_system;
 
 /** The discrete state, counted from 0. */
@@ -83,9 +83,9 @@ typedef enum rc_crossing {
     RC_EITHER = 2
 } rc_crossing;
 
-/** Number of a guard that stands for none. */
+/** Stands for "no guard" in place of the number of a guard. */
 #define RC_NO_GUARD ((size_t)-1)
-/** Number of a guard that stands for the reset of a time event. */
+/** Stands for the reset of a time event in place of the number of a guard. */
 #define RC_TIME_EVENT_RESET ((size_t)-2)
 
 /** Properties of a guard. All fields but the size may be zero. */
@@ -98,56 +98,56 @@ typedef struct rc_guard_info {
     int32_t boolean;     /**< 1: only its sign means anything: no rates, located by bisection */
     uint32_t stop_after; /**< the run ends with this many of its events; 0: never */
     int32_t degree;      /**< of the guard as a polynomial in (t, x) together; 0: not known */
-    double touch;        /**< |g| at a zero of its rate that counts as a touch */
-    double lipschitz;    /**< its change per unit of path, see speed_bound; 0: 1 */
+    double touch;        /**< |g| up to which a zero of its rate counts as a touch */
+    double lipschitz;    /**< largest change per unit of path, see speed_bound; 0 means 1 */
 } rc_guard_info;
 
-/* Callbacks. Each returns 0, or another number, an error of the host's own: then the call that
- * needed it returns RC_CALLBACK and the run stands where its last step, or event, was complete.
- * `user` is that of the rc_callbacks. `x` has `n` doubles and must not be written to where it is
- * const. A callback must not have side effects that change what it computes: steps are repeated.
- * It must not jump out (longjmp). `mode` is 0 in systems without modes. */
+/* Callbacks. Each returns 0 for success. Any other number is an error of the program's own: the
+ * call in progress then returns RC_CALLBACK, and the run stands after its last complete step or
+ * event. `user` is the member of rc_callbacks. `x` has `n` doubles; where it is const it must not
+ * be written to. Steps are repeated, so a callback must not have side effects that change what it
+ * computes. It must not jump out (longjmp). `mode` is 0 in systems without modes. */
 
-/** x' = f(t, x) into `dxdt`, n doubles, all of which are written. */
+/** Writes x' = f(t, x) into `dxdt`, all n doubles. */
 typedef int (*rc_flow_fn)(void* user, rc_mode mode, double t, const double* x, double* dxdt,
                           size_t n);
-/** All guards into `g`, `count` doubles: positive inside the mode, zero on the event surface. */
+/** Writes all guards into `g`, `count` doubles: positive inside the mode, zero on surfaces. */
 typedef int (*rc_guards_fn)(void* user, rc_mode mode, double t, const double* x, size_t n,
                             double* g, size_t count);
-/** Guard `which` into `g`. */
+/** Writes guard `which` into `g`. */
 typedef int (*rc_guard_fn)(void* user, size_t which, rc_mode mode, double t, const double* x,
                            size_t n, double* g);
-/** The rates dg/dt along the flow of all guards into `rates`; `dxdt` is x'. */
+/** Writes the rates dg/dt of all guards along the flow into `rates`; `dxdt` is x'. */
 typedef int (*rc_guard_rates_fn)(void* user, rc_mode mode, double t, const double* x,
                                  const double* dxdt, size_t n, double* rates, size_t count);
-/** The rate dg/dt along the flow of guard `which` into `rate`. */
+/** Writes the rate dg/dt of guard `which` along the flow into `rate`. */
 typedef int (*rc_guard_rate_fn)(void* user, size_t which, rc_mode mode, double t, const double* x,
                                 const double* dxdt, size_t n, double* rate);
-/** Makes the state after the event of guard `which` of the state before, and the next mode of the
- *  mode, both in place. What is not written to stays. */
+/** Replaces the state before the event of guard `which` by the state after it, and the mode by
+ *  the next mode, both in place. Components that are not written keep their values. */
 typedef int (*rc_reset_fn)(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n);
-/** The same for all guards that fired together, ascending in `fired`; `on_time` is 1 where a time
- *  event belongs to them. */
+/** Applies the resets of all guards that fired together, ascending in `fired`; `on_time` is 1 if
+ *  the set includes a time event. */
 typedef int (*rc_reset_set_fn)(void* user, const size_t* fired, size_t count, int on_time,
                                rc_mode* mode, double t, double* x, size_t n);
-/** Whether guard `which` is examined in this mode: 1 or 0 into `enabled`. */
+/** Writes 1 into `enabled` if guard `which` is examined in this mode, else 0. */
 typedef int (*rc_enabled_in_fn)(void* user, size_t which, rc_mode mode, int* enabled);
-/** Whether a crossing of guard `which` here is an event: 1 or 0 into `enabled`. */
+/** Writes 1 into `enabled` if a crossing of guard `which` here is an event, else 0. */
 typedef int (*rc_enabled_fn)(void* user, size_t which, rc_mode mode, double t, const double* x,
                              size_t n, int* enabled);
-/** The first time event after t, t excluded, into `next`, or INFINITY; for runs backward in time
- *  the last before t, or -INFINITY. */
+/** Writes the first time event after t (not at t) into `next`, or INFINITY if there is none; for
+ *  runs backward in time the last one before t, or -INFINITY. */
 typedef int (*rc_time_event_fn)(void* user, double t, double* next);
-/** As rc_reset_fn, for a time event. */
+/** Same as rc_reset_fn, for a time event. */
 typedef int (*rc_time_reset_fn)(void* user, rc_mode* mode, double t, double* x, size_t n);
-/** A bound of guard `which`, valid at (t, x), into `bound`. */
+/** Writes a bound of guard `which`, valid at (t, x), into `bound`. */
 typedef int (*rc_bound_fn)(void* user, size_t which, rc_mode mode, double t, const double* x,
                            size_t n, double* bound);
-/** The value of the parameter `name`, which a gate was trained for, into `value`. Leaves it as it
- *  is, NaN, where the system has no such parameter. */
+/** Writes the value of the parameter `name`, on which a gate depends, into `value`. Leaves `value`
+ *  unchanged, NaN, if the system has no such parameter. */
 typedef int (*rc_parameter_fn)(void* user, const char* name, double* value);
 
-/** A system to be. Set it to zero, then its size, its dimension, its flow and what else it has. */
+/** Description of a system. Zero it, then set its size, dimension, flow and other members. */
 typedef struct rc_callbacks {
     size_t size;        /**< sizeof(rc_callbacks) */
     size_t dimension;   /**< n, the number of components of the state, at least 1 */
@@ -159,12 +159,12 @@ typedef struct rc_callbacks {
 
     rc_flow_fn flow;               /**< required */
     rc_guards_fn guards;           /**< this or `guard` is required where there are guards */
-    rc_guard_fn guard;             /**< spares the others where one is located */
-    rc_guard_rates_fn guard_rates; /**< without rates they are differences along the flow */
+    rc_guard_fn guard;             /**< saves evaluating the others while one is located */
+    rc_guard_rates_fn guard_rates; /**< without both, rates are differences along the flow */
     rc_guard_rate_fn guard_rate;
     rc_reset_fn reset;                    /**< null: events change nothing */
     rc_reset_set_fn reset_set;            /**< in place of `reset` */
-    rc_reset_fn rest;                     /**< what becomes of the motion where events accumulate */
+    rc_reset_fn rest;                     /**< continues the motion where events accumulate */
     rc_enabled_in_fn enabled_in;          /**< null: all guards in all modes */
     rc_enabled_fn enabled;                /**< null: every crossing is an event */
     rc_time_event_fn next_time_event;     /**< null: none */
@@ -172,26 +172,26 @@ typedef struct rc_callbacks {
     rc_time_reset_fn time_reset;          /**< null: a time event changes nothing */
 
     /* How fast guards can change, for RC_PLANNED; see ricochet/hybrid/bounds.hpp. */
-    rc_bound_fn speed_bound; /**< path per second, at most this now */
+    rc_bound_fn speed_bound; /**< upper bound of the path per second, now */
     rc_bound_fn
-        acceleration_bound;  /**< of that speed, per second; null: speed_bound always holds */
+        acceleration_bound;  /**< change of that speed per second; null: speed_bound always holds */
     rc_bound_fn lower_bound; /**< guard >= this; null: none is known */
     rc_bound_fn upper_bound; /**< guard <= this; null: none is known */
 
     rc_parameter_fn parameter; /**< null: the gate's parameters are not compared */
 } rc_callbacks;
 
-/** Makes a system; `*system` is null after a failure. The callbacks struct need not be kept.
- *  RC_INVALID: no flow, no dimension, guards without a callback. RC_WRONG_SIZE, RC_NO_MEMORY. What
- *  guards say of themselves is checked where a run or a simulation starts. */
+/** Creates a system; `*system` is null after a failure. The callbacks struct need not be kept.
+ *  RC_INVALID: no flow, no dimension, guards without a callback. RC_WRONG_SIZE, RC_NO_MEMORY. The
+ *  properties of guards are checked when a simulation or a monitor is created. */
 RC_API rc_status rc_system_new(const rc_callbacks* callbacks, rc_system** system);
 
-/** Lets go of the system; simulations of it keep what they need. Null is allowed. */
+/** Releases the system; its simulations and monitors keep what they need. Null is allowed. */
 RC_API void rc_system_free(rc_system* system);
 
 /* --- options ----------------------------------------------------------------------------- */
 
-/** The method, by whose steps the motion continues. */
+/** The integration method. */
 typedef enum rc_method {
     RC_DOPRI5 = 0,     /**< order 5, error estimate, dense output */
     RC_FEHLBERG78 = 1, /**< order 8, error estimate: the cheapest for small errors */
@@ -202,22 +202,22 @@ typedef enum rc_method {
                      offered by C++ (ricochet/taylor.hpp) and by ready systems in Python */
 } rc_method;
 
-/** How it is decided whether a step holds events. */
+/** How events in a step are detected. */
 typedef enum rc_detector {
     RC_EXTREMUM = 0,  /**< ends and extremum inside, a check inside each step */
     RC_ENDS = 1,      /**< ends of the step only */
     RC_BERNSTEIN = 2, /**< proves for guards that declare a degree */
-    RC_PLANNED = 3,   /**< looks when declared bounds demand it; finds what RC_EXTREMUM finds */
-    /* With a gate, `rc_options.gate`, that has been trained elsewhere: */
-    RC_CALIBRATED = 4, /**< looks when a horizon gate says; may miss, as often as it was measured */
+    RC_PLANNED = 3,   /**< checks as declared bounds require; same events as RC_EXTREMUM */
+    /* These need a trained gate, `rc_options.gate`: */
+    RC_CALIBRATED = 4, /**< checks when a horizon gate says so; misses events at a measured rate */
     RC_CALIBRATED_BOUNDS = 5, /**< as RC_PLANNED, with the levels of a level gate as bounds */
-    RC_FORESEEN = 6 /**< as RC_PLANNED, a horizon gate says when a check is likely to do */
+    RC_FORESEEN = 6 /**< as RC_PLANNED; a horizon gate forecasts when a check is worth making */
 } rc_detector;
 
 /** How an event is located in its step. */
 typedef enum rc_locator { RC_NEWTON = 0, RC_BISECTION = 1, RC_TOMS748 = 2 } rc_locator;
 
-/** Options of a run. Fill them by rc_options_default, then change what is to be changed; t_end has
+/** Options of a run. Fill them with rc_options_default, then change those that differ; t_end has
  *  no default. */
 typedef struct rc_options {
     size_t size;           /**< sizeof(rc_options) */
@@ -246,11 +246,11 @@ typedef struct rc_options {
                                    copied; null: none */
     size_t sample_count;        /**< 0 */
     uint64_t max_steps;         /**< UINT64_MAX */
-    uint64_t stall_steps; /**< 1000000 steps in a row advance the time by 1e-9 of the span, or the
-                             run ends as RC_STALLED; 0: any number may stand still */
-    const char* gate;     /**< path of the model of the detectors that ask one, else null */
+    uint64_t stall_steps; /**< the run ends as RC_STALLED if this many steps in a row, 1000000,
+                             advance the time by less than 1e-9 of the span; 0: no limit */
+    const char* gate;     /**< path of the model for detectors with a gate, else null */
     const double* component_atol; /**< one for each component in place of atol, copied; null */
-    size_t component_count;       /**< of them, 0 */
+    size_t component_count;       /**< number of them, 0 */
 } rc_options;
 
 /** Fills in the defaults; `size` is sizeof(rc_options), and t_end becomes NaN. RC_WRONG_SIZE. */
@@ -283,65 +283,65 @@ typedef enum rc_outcome_code {
     RC_STOPPED_BY_CALLBACK = 16 /**< a callback failed; the run can be continued */
 } rc_outcome_code;
 
-/** Places a run of `system` at x0, n doubles, which are copied, and evaluates the flow and the
+/** Creates a run of `system` from x0, n doubles, which are copied, and evaluates the flow and the
  *  guards there. `n` must be the dimension of the system. `*simulation` is null after a failure.
  *  RC_INVALID with the option in question, RC_CALLBACK, RC_NO_MEMORY, RC_BAD_HANDLE,
  *  RC_WRONG_SIZE. */
 RC_API rc_status rc_simulation_new(const rc_system* system, const double* x0, size_t n,
                                    const rc_options* options, rc_simulation** simulation);
 
-/** Frees it, with all that was handed out of it. Null is allowed; RC_BUSY while it runs, and then
- *  nothing is freed. */
+/** Frees the simulation and everything obtained from it. Null is allowed; RC_BUSY while it runs,
+ *  and then nothing is freed. */
 RC_API rc_status rc_simulation_free(rc_simulation* simulation);
 
-/* The three below return RC_CALLBACK where a callback failed. What has been computed is kept, time
+/* The next three functions return RC_CALLBACK if a callback failed. Results so far are kept, time
  * and state are those of the last complete step or event, the outcome is RC_STOPPED_BY_CALLBACK,
  * and the next call continues from there, with the same bits as if nothing had happened. A run that
  * has ended stays as it is. */
 
-/** Takes one step, with whatever events it holds. 0 into `goes_on` (which may be null) if the run
- *  has ended. */
+/** Takes one step, with any events that it holds. Writes 0 into `goes_on` (which may be null) if
+ *  the run has ended, else 1. */
 RC_API rc_status rc_step(rc_simulation* simulation, int* goes_on);
 
-/** Goes on to the next sample time, or to the end of the next step that holds events. 0 into
- *  `goes_on` if the run has ended and nothing happened that was not shown. */
+/** Advances to the next sample time, or to the end of the next step that holds events. Writes 0
+ *  into `goes_on` if the run has ended and everything that happened has been shown, else 1. */
 RC_API rc_status rc_advance(rc_simulation* simulation, int* goes_on);
 
-/** Goes on to the end. */
+/** Advances to the end. */
 RC_API rc_status rc_run(rc_simulation* simulation);
 
-/** Ends the run after the step in progress, as RC_CANCELLED; from any thread, a signal handler or
- *  a callback. The next call that advances the run continues it. */
+/** Ends the run after the step in progress, with the outcome RC_CANCELLED. May be called from any
+ *  thread, a signal handler or a callback. The next call that advances the run continues it. */
 RC_API rc_status rc_cancel(rc_simulation* simulation);
 
-/** Where a callback failed last. */
+/** The last failure of a callback. */
 typedef struct rc_callback_error {
     size_t size;          /**< sizeof(rc_callback_error), filled in by the caller */
-    int32_t code;         /**< what it returned; 0: none has failed */
+    int32_t code;         /**< number that it returned; 0: none has failed */
     uint32_t reserved;    /**< 0 */
     const char* callback; /**< its name in rc_callbacks, e.g. "flow", or in rc_host_step; null:
                                none has failed */
-    size_t guard;         /**< that it was called for, else RC_NO_GUARD */
-    double t;             /**< [s] that it was called with; NaN: none */
+    size_t guard;         /**< for which it was called, else RC_NO_GUARD */
+    double t;             /**< [s] at which it was called; NaN: none */
 } rc_callback_error;
 
-/** Where a callback failed last in this run; after RC_CALLBACK of rc_simulation_new, which leaves
- *  no simulation, pass null for the last failure of that kind in this thread. */
+/** Describes the last failure of a callback in this run. After RC_CALLBACK of rc_simulation_new,
+ *  which leaves no simulation, pass null for the last such failure in this thread. */
 RC_API rc_status rc_callback_failure(rc_simulation* simulation, rc_callback_error* error);
 
-/* --- what a run has come to -------------------------------------------------------------- */
+/* --- results of a run -------------------------------------------------------------------- */
 
 /** The time [s]; NaN for a handle that cannot be used. */
 RC_API double rc_time(rc_simulation* simulation);
-/** The state at that time, n doubles, until the next call that advances, restores or frees the
- *  simulation; null for a handle that cannot be used. */
+/** The state at that time, n doubles, valid until the next call that advances, restores or frees
+ *  the simulation; null for a handle that cannot be used. */
 RC_API const double* rc_state(rc_simulation* simulation);
 /** The mode at that time; UINT32_MAX for a handle that cannot be used. */
 RC_API rc_mode rc_mode_now(rc_simulation* simulation);
 
 /** How the run ended; RC_RUNNING before, and for a handle that cannot be used. */
 RC_API rc_outcome_code rc_outcome(rc_simulation* simulation);
-/** The name of an outcome, e.g. "reached_end"; "running"; "unknown" for a number that is none. */
+/** The name of an outcome, e.g. "reached_end"; "running"; "unknown" for any other number. */
 RC_API const char* rc_outcome_name(rc_outcome_code outcome);
 /** One sentence about an outcome, with the remedy. */
 RC_API const char* rc_outcome_text(rc_outcome_code outcome);
@@ -358,20 +358,20 @@ typedef struct rc_statistics {
     uint64_t guard_calls;
     uint64_t network_calls;   /**< of gates */
     uint64_t late_events;     /**< missed at first, found at a later step */
-    uint64_t checks_deferred; /**< steps whose check a plan or a gate saved */
+    uint64_t checks_deferred; /**< steps whose exact check a plan or a gate deferred for good */
     uint64_t outside_domain;  /**< states outside the box of a gate: checked exactly */
     uint64_t bound_calls;
-    uint64_t rollbacks;      /**< intervals taken back to a step that was not closed */
-    uint64_t repeated_steps; /**< steps taken again for that */
+    uint64_t rollbacks;      /**< returns to a step that could not be closed */
+    uint64_t repeated_steps; /**< steps taken again after a rollback */
     uint64_t events;
     uint64_t suppressed; /**< repeats of an event inside its own window */
-    uint64_t disabled;   /**< crossings that `enabled` said were no events */
-    /* Steps without an event, by what is known of them. */
+    uint64_t disabled;   /**< crossings that `enabled` rejected */
+    /* Steps without an event, by the evidence for it. */
     uint64_t proved;    /**< a bound or a polynomial excludes a root */
     uint64_t checked;   /**< the ends and the extremum inside were examined */
     uint64_t gated;     /**< a calibrated gate skipped the check */
     uint64_t assumed;   /**< only the ends were examined */
-    size_t guard;       /**< that ended the run, or RC_NO_GUARD */
+    size_t guard;       /**< the guard that ended the run, or RC_NO_GUARD */
     size_t other_guard; /**< of two conflicting resets the second, or RC_TIME_EVENT_RESET */
 } rc_statistics;
 
@@ -396,7 +396,7 @@ typedef struct rc_event {
     int32_t late; /**< 1: found at a step after the one that held it */
     rc_mode mode_before;
     rc_mode mode_after;
-    const double* before; /**< n doubles; null if not kept. Until the simulation continues */
+    const double* before; /**< n doubles; null if not kept. Valid until the simulation continues */
     const double* after;  /**< n doubles, the same as before where nothing is reset */
     double bracket_lo;    /**< [s] the guard is still on its side here, */
     double bracket_hi;    /**< [s] and has left it here */
@@ -424,22 +424,22 @@ RC_API rc_status rc_solution_before(rc_simulation* simulation, double t, double*
 /** The mode at time t, after an event at t. */
 RC_API rc_status rc_solution_mode(rc_simulation* simulation, double t, rc_mode* mode);
 
-/** Saves all that the future of the run depends on, as text without a terminating zero. On entry
- *  `*size` is the room at `bytes`, on return the number of bytes that it takes. Null for `bytes`
- *  asks for the number alone; RC_INVALID if the room is too small. What was recorded is not part
- *  of it. */
+/** Saves everything on which the future of the run depends, as text without a terminating zero. On
+ *  entry `*size` is the capacity of `bytes`, on return the number of bytes needed. If `bytes` is
+ *  null, only that number is computed; RC_INVALID if the capacity is too small. Recorded results
+ *  are not saved. */
 RC_API rc_status rc_save(rc_simulation* simulation, void* bytes, size_t* size);
-/** Goes back, or on, to what was saved, of the same or of another simulation of the same system
- *  with the same options, but for its end, its sample times and what it records. What was
- *  recorded stays. RC_INVALID names what does not agree; then nothing has changed. */
+/** Returns to a state saved from this or another simulation of the same system with the same
+ *  options; only the end, the sample times and what is recorded may differ. Recorded results are
+ *  kept. RC_INVALID names what does not agree; then nothing has changed. */
 RC_API rc_status rc_restore(rc_simulation* simulation, const void* bytes, size_t size);
 
 /* --- monitors ---------------------------------------------------------------------------- */
 
-/** The events of a motion that the program, the host, integrates by itself. It shows every step
- *  that its integrator has accepted, in order, each beginning where the last one ended; steps that
- *  it rejects are never shown. Steps are half-open, (t0, t0 + h]. The monitor changes nothing of
- *  the host:
+/** Finds the events of a motion that the program, called the host, integrates itself. The host
+ *  shows every step that its integrator has accepted, in order, each beginning where the last one
+ *  ended; steps that it rejects are never shown. Steps are half-open, (t0, t0 + h]. The monitor
+ *  does not change the host:
  *
  *      rc_monitor_start(monitor, t, x, dxdt, n, 0, h, &verdict);
  *      while (verdict == RC_STANDS && t < t_end) {
@@ -453,11 +453,11 @@ RC_API rc_status rc_restore(rc_simulation* simulation, const void* bytes, size_t
  *          }
  *      }
  *
- *  What happens at an event is what a run does that takes the same steps. */
+ *  At an event the monitor does what a run would do that takes the same steps. */
 typedef struct rc_monitor rc_monitor;
 
-/** Options of a monitor. Fill them by rc_monitor_options_default, then change what is to be
- *  changed. */
+/** Options of a monitor. Fill them with rc_monitor_options_default, then change those that
+ *  differ. */
 typedef struct rc_monitor_options {
     size_t size;            /**< sizeof(rc_monitor_options) */
     double event_tolerance; /**< [s] of the bracket of an event, 0: neighbouring doubles */
@@ -472,7 +472,7 @@ typedef struct rc_monitor_options {
     int32_t cut_at_all; /**< 0; 1: every crossing ends its step, whether the system has a reset for
                            it or not: for hosts that change the state themselves */
     int32_t reserved;   /**< 0 */
-    const char* gate;   /**< path of the model of the detectors that ask one, else null */
+    const char* gate;   /**< path of the model for detectors with a gate, else null */
 } rc_monitor_options;
 
 /** Fills in the defaults; `size` is sizeof(rc_monitor_options). RC_WRONG_SIZE. */
@@ -491,14 +491,14 @@ typedef enum rc_verdict {
  *  error of the host's own. */
 typedef int (*rc_offset_fn)(void* user, double s, double* x, size_t n);
 
-/** A step that a host has accepted, from t0 to t0 + h, or t0 - h backward. It is read during the
- *  call that it is handed to. Rates are with respect to offsets: those of the path that
+/** A step that a host has accepted, from t0 to t0 + h, or t0 - h backward. It is read only during
+ *  the call to which it is passed. Rates are with respect to offsets: those of the path that
  *  `interpolate` follows, backward in time -x'. */
 typedef struct rc_host_step {
     size_t size;         /**< sizeof(rc_host_step) */
     size_t n;            /**< finite doubles in each array, the dimension of the system */
     double t0;           /**< [s] */
-    double t0_remainder; /**< [s] what the host's sum of times has lost, if it keeps that, else 0 */
+    double t0_remainder; /**< [s] rounding error of t0, if the host carries it along; 0 if not */
     double h;            /**< [s] above 0 */
     const double* x0;    /**< the states at its start, */
     const double* x1;    /**< and at its end */
@@ -517,40 +517,40 @@ typedef struct rc_cut {
     size_t size;          /**< sizeof(rc_cut), filled in by the caller */
     double s;             /**< [s] offset in the step shown last; 0 where the set follows another */
     double t;             /**< [s] */
-    double t_remainder;   /**< [s] what rounding took from t */
-    const double* before; /**< n doubles, until the next call that may be a cut */
-    const double* after;  /**< n doubles, as long */
-    const size_t* fired;  /**< the guards, ascending, as long; of an accumulation the one at rest */
+    double t_remainder;   /**< [s] rounding error of t */
+    const double* before; /**< n doubles, valid until the next call that may be a cut */
+    const double* after;  /**< n doubles, valid as long */
+    const size_t* fired;  /**< the guards, ascending; of an accumulation the one at rest. As long */
     size_t fired_count;
     rc_mode mode_before;
     rc_mode mode_after;
     int32_t on_time;       /**< 1: with a time event */
-    int32_t accumulation;  /**< 1: `after` is what `rest` makes of the limit, `t` its time */
+    int32_t accumulation;  /**< 1: `after` is the state given by `rest` for the limit, at `t` */
     int32_t state_changed; /**< 0: the host need not start again */
     int32_t reserved;      /**< 0 */
 } rc_cut;
 
-/** Makes a monitor of the events of `system`; it has to be started. Null for `options`: the
- *  defaults. `*monitor` is null after a failure. The flow is only asked where the host gives no
- *  rate, and where a guard starts on its surface without one. RC_INVALID with the option in
+/** Creates a monitor of the events of `system`, which must then be started. If `options` is null,
+ *  the defaults apply. `*monitor` is null after a failure. The flow is called only if the host
+ *  gives no rate, or a guard starts on its surface without one. RC_INVALID with the option in
  *  question, or for a system without events; RC_NO_MEMORY, RC_BAD_HANDLE, RC_WRONG_SIZE. */
 RC_API rc_status rc_monitor_new(const rc_system* system, const rc_monitor_options* options,
                                 rc_monitor** monitor);
 
-/** Frees it, with all that was handed out of it. Null is allowed; RC_BUSY while it is in use, and
- *  then nothing is freed. */
+/** Frees the monitor and everything obtained from it. Null is allowed; RC_BUSY while it is in use,
+ *  and then nothing is freed. */
 RC_API rc_status rc_monitor_free(rc_monitor* monitor);
 
 /* The calls below take arrays of `n` finite doubles, where n is the dimension of the system, and
- * copy them. Rates are as in rc_host_step; null for `dxdt`: the system's flow is asked. `scale` [s]
- * is roughly the length of the next step. After RC_INVALID and RC_OUT_OF_TURN nothing has changed,
- * and the right call may follow. After any other failure, such as RC_CALLBACK, what has been found
- * in the current step is half done, and the monitor waits for rc_monitor_start or
+ * copy them. Rates are as in rc_host_step; if `dxdt` is null, the system's flow is called. `scale`
+ * is roughly the length of the next step [s]. After RC_INVALID and RC_OUT_OF_TURN nothing has
+ * changed, and the right call may follow. After any other failure, such as RC_CALLBACK, the search
+ * in the current step is incomplete, and the monitor accepts only rc_monitor_start or
  * rc_monitor_restore. */
 
-/** Arms all guards at a state that no event has led to: at the start, and after whatever a host
- *  does to the state by itself. May be a cut immediately. RC_INVALID for a start that is not
- * finite, or behind a surface that bounds the motion; then a start has to follow. */
+/** Arms all guards at a state that no event has produced: at the start, and after the host has
+ *  changed the state itself. The verdict may be a cut immediately. RC_INVALID for a start that is
+ * not finite, or behind a surface that bounds the motion; a new start must then follow. */
 RC_API rc_status rc_monitor_start(rc_monitor* monitor, double t, const double* x,
                                   const double* dxdt, size_t n, rc_mode mode, double scale,
                                   rc_verdict* verdict);
@@ -560,41 +560,41 @@ RC_API rc_status rc_monitor_start(rc_monitor* monitor, double t, const double* x
 RC_API rc_status rc_monitor_examine(rc_monitor* monitor, const rc_host_step* step,
                                     rc_verdict* verdict);
 
-/** After a cut, once the host has gone to `after`: arms all guards with the rate there. May be a
- *  cut again: guards that a reset has carried across their surfaces, at the same instant, or a
- *  motion that comes to rest. */
+/** Arms all guards after a cut, with the rate at `after`, to which the host must have gone. The
+ *  verdict may be another cut at the same instant: for guards that a reset has carried across their
+ *  surfaces, or for a motion that comes to rest. */
 RC_API rc_status rc_monitor_resume(rc_monitor* monitor, const double* dxdt, size_t n, double scale,
                                    rc_verdict* verdict);
-/** The same from a state of the host's own making in place of `after`. */
+/** The same, from a state that the host chooses instead of `after`. */
 RC_API rc_status rc_monitor_resume_at(rc_monitor* monitor, const double* x, const double* dxdt,
                                       size_t n, rc_mode mode, double scale, rc_verdict* verdict);
 
-/** After RC_RESTS: the state has been kept until t [s], rc_monitor_must_stop_at at most. At a time
- *  event a cut. */
+/** Tells the monitor, after RC_RESTS, that the state has been kept until t [s], at most
+ *  rc_monitor_must_stop_at. The verdict is a cut at a time event. */
 RC_API rc_status rc_monitor_hold(rc_monitor* monitor, double t, rc_verdict* verdict);
 
 /** The last set of events. RC_OUT_OF_TURN if there has been none since the start. */
 RC_API rc_status rc_monitor_cut(rc_monitor* monitor, rc_cut* cut);
 
-/** Where the next step begins [s], and into `remainder`, which may be null, what rounding took
- *  from it; NaN before the start, and for a handle that cannot be used. */
+/** Time [s] at which the next step begins; its rounding error is written into `remainder`, which
+ *  may be null. NaN before the start, and for a handle that cannot be used. */
 RC_API double rc_monitor_time(rc_monitor* monitor, double* remainder);
-/** The state there, n doubles, until the next call that starts, advances, restores or frees the
- *  monitor; null before the start, and for a handle that cannot be used. */
+/** The state there, n doubles, valid until the next call that starts, advances, restores or frees
+ *  the monitor; null before the start, and for a handle that cannot be used. */
 RC_API const double* rc_monitor_state(rc_monitor* monitor);
 /** The mode there; UINT32_MAX before the start, and for a handle that cannot be used. */
 RC_API rc_mode rc_monitor_mode(rc_monitor* monitor);
 
-/** The next time event [s], beyond which no step goes; infinite where there is none; NaN before the
+/** The next time event [s], which no step may pass; infinite if there is none; NaN before the
  *  start, and for a handle that cannot be used. */
 RC_API double rc_monitor_must_stop_at(rc_monitor* monitor);
-/** Up to this time [s] no guard needs a check, by the bounds that the system has or by a gate: the
- *  host may go there in steps that it does not show, by rc_monitor_skip_to. Where nothing is known
- *  it is the current time; NaN before the start, and for a handle that cannot be used. */
+/** Time [s] up to which no guard needs a check, by the system's bounds or by a gate: the host may
+ *  go there in steps that it does not show, by rc_monitor_skip_to. Without bounds or a gate it is
+ *  the current time; NaN before the start, and for a handle that cannot be used. */
 RC_API double rc_monitor_quiet_until(rc_monitor* monitor);
-/** The host has continued to t, at most rc_monitor_quiet_until and before the next time event, in
- * one step or several; x and its rate, which must be given, are those there. RC_OUT_OF_TURN beyond.
- */
+/** Tells the monitor that the host has continued to t, at most rc_monitor_quiet_until and before
+ * the next time event, in one step or several; x and its rate, which is required, belong to t.
+ * RC_OUT_OF_TURN if t lies beyond that. */
 RC_API rc_status rc_monitor_skip_to(rc_monitor* monitor, double t, const double* x,
                                     const double* dxdt, size_t n);
 
@@ -610,14 +610,14 @@ typedef enum rc_side {
 RC_API rc_status rc_monitor_side(rc_monitor* monitor, size_t which, rc_side* side);
 
 /** How the run ended; RC_RUNNING before, and for a handle that cannot be used;
- *  RC_STOPPED_BY_CALLBACK where it waits for a start after a callback that failed. */
+ *  RC_STOPPED_BY_CALLBACK while the monitor waits for a start after a callback has failed. */
 RC_API rc_outcome_code rc_monitor_outcome(rc_monitor* monitor);
 /** The guard that ended the run, or RC_NO_GUARD. */
 RC_API size_t rc_monitor_guard(rc_monitor* monitor);
-/** Describes the last failure of a callback like rc_callback_failure, of this monitor; null: of
+/** Describes the last failure of a callback in this monitor, like rc_callback_failure; null: in
  * this thread. */
 RC_API rc_status rc_monitor_callback_failure(rc_monitor* monitor, rc_callback_error* error);
-/** Fills in the counts like rc_get_statistics; calls of the flow are the host's, and not counted.
+/** Fills in the counts like rc_get_statistics; the host's own calls of the flow are not counted.
  */
 RC_API rc_status rc_monitor_statistics(rc_monitor* monitor, rc_statistics* statistics);
 
@@ -628,9 +628,9 @@ RC_API rc_status rc_monitor_event_at(rc_monitor* monitor, size_t index, rc_event
 /** Forgets the events recorded so far. */
 RC_API rc_status rc_monitor_clear_events(rc_monitor* monitor);
 
-/** Saves the monitor like rc_save, between two steps: all that its future depends on; the host
- * saves its own state. RC_OUT_OF_TURN before the start, before a cut was resumed, and after the
- * end. */
+/** Saves the monitor like rc_save, between two steps: everything on which its future depends. The
+ * host saves its own state. RC_OUT_OF_TURN before the start, before a cut was resumed, and after
+ * the end. */
 RC_API rc_status rc_monitor_save(rc_monitor* monitor, void* bytes, size_t* size);
 /** Restores a saved state like rc_restore, of the same or of another monitor of the same system
  * with the same options. */

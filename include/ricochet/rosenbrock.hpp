@@ -105,7 +105,7 @@ using MatrixLike =
     std::conditional_t<(fixed_size<C>() > 0), std::array<double, fixed_size<C>() * fixed_size<C>()>,
                        std::vector<double>>;
 
-/// A = L U in place, with row exchanges; false where it is singular or not finite.
+/// Factorizes A = L U in place, with row exchanges. False: A is singular or not finite.
 [[nodiscard]] inline bool factorize(std::size_t n, double* a, std::size_t* rows) noexcept
 {
     for (std::size_t i = 0; i < n; ++i) {
@@ -126,7 +126,7 @@ using MatrixLike =
     return true;
 }
 
-/// b becomes A^-1 b.
+/// Replaces b by A^-1 b.
 template <class C>
 void substitute(std::size_t n, const double* a, const std::size_t* rows, C& b) noexcept
 {

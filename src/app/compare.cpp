@@ -226,7 +226,7 @@ void add_verdict(const std::vector<Method>& methods, bool fixed_step,
     }
 }
 
-/// Empty where methods are missing.
+/// Sentences that compare the methods; empty after an interrupt, since some were not run.
 std::vector<std::string> verdict(const std::vector<Method>& methods)
 {
     std::vector<std::string> sentences;

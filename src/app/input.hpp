@@ -11,7 +11,7 @@
 
 namespace ricochet::app {
 
-/// Input that cannot be right. Ends the command with status 2, and nothing is written.
+/// Error in the user's input. Ends the command with status 2; nothing is written.
 class BadInput : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;

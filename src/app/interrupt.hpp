@@ -60,7 +60,7 @@ public:
     }
 
     [[nodiscard]] static bool any() noexcept { return flag_.load(std::memory_order_relaxed); }
-    /// For `Options::cancelled`.
+    /// The flag to pass as `Options::cancelled`.
     [[nodiscard]] static const std::atomic<bool>* flag() noexcept { return &flag_; }
 
     /// "interrupted"; empty without an interrupt.

@@ -1,4 +1,4 @@
-// A run in words, as JSON, and as rows of numbers.
+// Reports on a run: as text, as JSON, and as rows of numbers.
 #pragma once
 
 #include <string>
@@ -39,7 +39,7 @@ struct Row {
 /// `where` it ended; returns the exit status.
 [[nodiscard]] int ended_early(std::string_view where);
 
-/// The same in a table of numbers: its last line, a comment.
+/// The same for a table of numbers: a comment, to be its last line.
 [[nodiscard]] std::string incomplete_line();
 
 /// Prints to standard output.

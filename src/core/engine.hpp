@@ -87,7 +87,7 @@ protected:
     /// Puts the guards that fire at the start into the fired set.
     void arm_at_start();
 
-    /// Whether a guard outside the fired set is on its other side at the set by no more than
+    /// Whether guard i, not in the fired set, is on its other side at the set by no more than
     /// rounding.
     [[nodiscard]] bool is_flipped_by_rounding(std::size_t i, Side before);
 
@@ -339,7 +339,7 @@ protected:
             .rate(step_.time(0), step_.x0(), step_.rate0(), scale);
     }
 
-    /// The events of guard i accumulate `ahead` [s] from here; `error` [s] is the uncertainty.
+    /// Brings guard i to rest: its events accumulate `ahead` [s] from here, known to `error` [s].
     void come_to_rest(std::size_t i, double ahead, double error);
 
     /// Whether guard i keeps its value while the state stands still, because its surface does not
@@ -373,7 +373,7 @@ protected:
         return bank_[i].info.unilateral && bank_[i].enabled && bank_[i].side == Side::below;
     }
 
-    /// Whether a unilateral guard is on its surface and its reset does not turn it back.
+    /// The first unilateral guard that fired, if the resets have changed nothing; else `no_guard`.
     [[nodiscard]] std::size_t stuck_guard();
 
     // --- recording ---
@@ -452,7 +452,7 @@ protected:
     double h_next_ = 0;        ///< [s] approximate length of the next step
     double last_h_ = 0;        ///< [s] the previous step, or the scale at which guards were armed
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
-    bool watching_ = false;    ///< and their rates, too: every step is checked
+    bool watching_ = false;    ///< rates are sampled too, since every step is checked
     double time_event_ = std::numeric_limits<double>::infinity();
     bool time_event_due_ = false;
     bool ended_ = false;
@@ -472,7 +472,7 @@ protected:
     double set_remainder_ = 0;
     int level_ = 0;  ///< number of sets so far at this instant
     Run<X> run_;
-    std::string_view who_ = "integrate";  ///< with which refusals begin
+    std::string_view who_ = "integrate";  ///< name with which messages of refusal begin
 };
 
 }  // namespace ricochet::detail

@@ -44,7 +44,7 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
         // A crossing so soon after this one would be taken for its repetition.
         const double soon = 2 * std::fabs(rate) * resolution_.window(step_.start().value);
         jump_lost = record.intervals.jump_is_lost(away, std::max(rounding, soon));
-        // Farther than an error of location explains: it is there whether the guard rises or not.
+        // A guard farther away than an error of location explains does not fade, rising or not.
         // Without a location the reset of another guard may carry it across its surface.
         if ((located_ ? away : std::fabs(away)) > 1024 * rounding) {
             record.turned = away > 0;

@@ -1,4 +1,4 @@
-// Crossings of guards that are recorded only, all of those in a step.
+// All crossings in a step of guards that are only recorded.
 #pragma once
 
 #include "core/event_search.hpp"

@@ -317,7 +317,7 @@ private:
             return true;
         }
         if (is_plateau(probe, watch)) {
-            // After a crossing it is none where the guard moves by no more than its rounding.
+            // After a crossing a guard that moves by no more than its rounding is not on a plateau.
             const double moves = std::fabs(watch.start.rate) * (watch.end.s - watch.start.s);
             const bool rated = std::fabs(watch.start.rate) > std::numeric_limits<double>::min();
             const bool crossing = record.from > 0 && rated && moves <= probe.blur(watch.end.s);

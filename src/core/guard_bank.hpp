@@ -240,7 +240,7 @@ public:
         return width <= 1e-10 * h ? width : 1e-10 * h;
     }
 
-    /// Defers guard i: it is not examined until it is woken.
+    /// Defers guard i, which is not examined until it is woken.
     void put_to_sleep(std::size_t i) noexcept
     {
         records_[i].deferred = true;

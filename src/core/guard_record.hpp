@@ -62,7 +62,7 @@ private:
     std::size_t size_ = 0;
 };
 
-/// State of a guard beside its values.
+/// State of a guard besides its values.
 struct GuardRecord {
     GuardInfo info;
     bool enabled = true;

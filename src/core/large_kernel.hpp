@@ -33,7 +33,7 @@ class LargeKernel {
     /// Four doubles, in one register or in two, by the instruction set.
     typedef double Four __attribute__((vector_size(32)));
 
-    /// The flow at offset s and state `room`, as dx/ds.
+    /// Writes dx/ds at offset s and state `step.at` into `rate`.
     static void flow(void* door, State& step, double s, X& rate)
     {
         ++step.flow_calls;

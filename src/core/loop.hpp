@@ -112,8 +112,8 @@ public:
     /// everything that has happened in it was shown.
     bool advance() override;
 
-    /// One step. If it checks_inside ahead, it may end in the middle of an interval of tentative
-    /// steps.
+    /// Takes one step. If it looks ahead, the step may end in the middle of an interval of
+    /// tentative steps.
     void advance_once(bool look_ahead) override { advance_one({.look_ahead = look_ahead}); }
 
     void run_to_end() override;
@@ -214,7 +214,7 @@ private:
 
     [[nodiscard]] std::vector<RunProperty> properties() const;
 
-    /// Takes over the values of a snapshot that has been read.
+    /// Checks that a run can reach the place read from a snapshot. @throws std::invalid_argument
     void refuse_bad_place() const;
 
     // --- steps ---
@@ -235,7 +235,7 @@ private:
     [[gnu::noinline]] void advance_resumably(const Advance& how);
     [[gnu::always_inline]] void advance_from_here(const Advance& how);
 
-    // --- return to after an exception ---
+    // --- resumption after an exception ---
 
     struct Mark {
         explicit Mark(const GuardBank<X, single>& bank_) : bank(bank_) {}
@@ -310,7 +310,7 @@ private:
         return std::fabs(step_.until(reviewed_)) < 1e-9 * span;
     }
 
-    /// Handles a failed step: an event before the failure, or the end of the run.
+    /// Ends the run after a failed step.
     void end_step(Outcome outcome) noexcept
     {
         end(step_.flow_fits() ? outcome : Outcome::wrong_dimension);
@@ -343,14 +343,14 @@ private:
 
     void remember_step(double proposed, std::uint64_t rejected);
 
-    /// Whether the next step, too, may be taken before the interval is closed.
+    /// Whether the next step may also be taken before the interval is closed.
     [[nodiscard]] bool may_go_on(double ends, const Advance& how);
 
-    /// The current step is the last of its interval: closes it, or goes back to the first step
+    /// Closes the interval, of which the current step is the last, or goes back to the first step
     /// that could not be closed.
     void close_interval();
 
-    /// The exact detector examines the current step, for the guards in doubt.
+    /// Lets the exact detector examine the current step, for the guards in doubt.
     void judge();
 
     /// Rolls the whole interval back without a check, and continues step by step.
@@ -483,7 +483,7 @@ private:
 
     static constexpr ErrorRule rule_{};
 
-    /// As `rule_.factor`, with the powers that it starts from as constants.
+    /// As `rule_.factor`, with the errors below which the factor is the largest as constants.
     [[nodiscard]] static double step_factor(double error, int order) noexcept
     {
         static constexpr auto floors = [] {

@@ -146,9 +146,9 @@ public:
     /// Whether the interval is expected to be closed at the time `end`.
     [[nodiscard]] bool hopes(double end) const noexcept { return end <= hoped_; }
 
-    /// Checks every pending guard at the end of the current step, and at earlier starts if doubts
-    /// remain. Returns the first step that could not be closed, or `none`; the guards
-    /// to be assessed in it, if it is the current step, are in `assessed`.
+    /// Checks every pending guard at the end of the current step and, if doubts remain, at earlier
+    /// starts. Returns the first step that could not be closed, or `none`; if it is the current
+    /// step, `judged` has the guards that the exact detector examines in it.
     [[nodiscard]] std::size_t close(const Step<X>& step, Bank& bank, Statistics& counts,
                                     double h_next)
     {
@@ -443,7 +443,7 @@ private:
         check.later_value = value;
     }
 
-    /// The guard's exact value, unless it is known from the last check or another.
+    /// The guard's exact value: that of the last check or another at this time, or else evaluated.
     [[nodiscard]] double value_at(std::size_t i, const Check& at, Mode mode, const Bank& bank,
                                   Statistics& counts)
     {
@@ -477,8 +477,8 @@ private:
         return {.time = clock(t), .t = t, .x = &x};
     }
 
-    /// A check that covers by a lower bound there, or by an upper bound below the surface, if one
-    /// of them does.
+    /// A check by which the lower bound there or, below the surface, the upper bound covers guard i,
+    /// if one does.
     [[nodiscard]] std::optional<Check> bound_at(std::size_t i, std::size_t k, const Step<X>& step,
                                                 const Bank& bank, Statistics& counts)
     {

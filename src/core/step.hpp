@@ -21,7 +21,7 @@
 
 namespace ricochet::detail {
 
-/// Refuses to place an event by a state that is not finite. @throws std::domain_error
+/// Refuses to place an event at a state that is not finite. @throws std::domain_error
 [[noreturn]] void throw_host_not_finite(std::size_t component, double found, double s,
                                         bool by_restep);
 
@@ -411,7 +411,7 @@ public:
         return {state_.start, state_.mode, state_.x0, state_.remainder, state_.rate0};
     }
 
-    /// Places the step as `place` does, in memory that is already allocated.
+    /// Copies the start of the step, like `place`, into memory that is already allocated.
     void store(StepStart<X>& at) const
     {
         at.t = state_.start;

@@ -313,7 +313,7 @@ private:
         return least(c, degree_, 1) > margin || least(c, degree_, -1) > margin;
     }
 
-    /// Whether all coefficients but the first are, and the first belongs to the interval's start.
+    /// Whether all coefficients but the first are off the surface, and the first is at the start.
     [[nodiscard]] bool leaves_surface(const Fit& fit, const Piece& piece) const noexcept
     {
         if (piece.from > 0 || fit.from > watch_.start.s) return false;

@@ -59,7 +59,7 @@ constexpr int most_samples = 80;
 /// Fraction of a step below which a rate that is a difference over 1e-5 of it smooths a kink.
 constexpr double coarse_part = 1e-3;
 
-/// Clear if this is known: NaN is no evidence.
+/// A clear finding: `checked` if that is known, else only `assumed`, as where a value is NaN.
 Finding clear_if(bool known) noexcept
 {
     return Finding::clear(known ? Evidence::checked : Evidence::assumed);

@@ -94,7 +94,7 @@ SampledCost& Meter::step_of(Way way) noexcept
     return way == check || planned_guards_ == 0 ? checked_step_ : planned_step_;
 }
 
-/// Cost of a step. Without planning it may be lower, but not by any factor.
+/// Cost of a step. While it is not known without planning, a fraction of the cost with planning.
 double Meter::step_cost(Way way) const noexcept
 {
     if (way != check && planned_guards_ > 0) return planned_step_.value();

@@ -11,7 +11,7 @@
 
 namespace ricochet::detail {
 
-/// A team that does task after task together with the caller.
+/// Threads that execute one task after another, together with the caller.
 ///
 /// Any thread may do any part, so that parts must not depend on each other. The caller does not
 /// wait for threads that have not started a part: on a busy machine it may do all of them.
@@ -37,8 +37,8 @@ private:
     const std::function<void(std::size_t)>* part_ = nullptr;
     std::size_t parts_ = 0;
     std::vector<std::exception_ptr> errors_;  ///< one per part
-    /// Number of the task, times 2^32, plus its parts that are not taken. A thread that takes one
-    /// by an exchange knows that its task continues, and may read the members above.
+    /// 2^32 times the number of the task, plus the number of its parts not yet taken. A thread that
+    /// takes a part by an exchange knows that its task continues, and may read the members above.
     std::atomic<std::uint64_t> ticket_{0};
     std::atomic<std::size_t> unfinished_{0};
     std::atomic<bool> closing_{false};

@@ -78,7 +78,7 @@ public:
     {
         return fault_.mean(now_.fields.path * fault_.slip_unit());
     }
-    /// Whether nothing moves, and no element is driven beyond its strength.
+    /// Whether the fault is at rest and no element is loaded beyond its strength.
     bool at_rest() { return now_.fields.velocity.isZero(0) && rests(); }
 
     Rupture run()

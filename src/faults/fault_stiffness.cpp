@@ -80,7 +80,7 @@ public:
         const auto longest = std::max(length, static_cast<std::size_t>(4 * blocks_));
         a_.resize(longest);
         b_.resize(longest);
-        // Plans are made at their first use: here, so that it is not in the first product.
+        // FFT plans are made at first use: force this here, not in the first product.
         fft_.forward(b_.data(), a_.data());
         fft_.inverse(a_.data(), b_.data());
 #ifdef RICOCHET_WITH_FFTW

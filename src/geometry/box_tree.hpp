@@ -113,7 +113,7 @@ public:
         build(boxes);
     }
 
-    /// The things in the order of the tree: block b holds places 4 b to 4 b + 3.
+    /// The items in the order of the tree: block b holds places 4 b to 4 b + 3.
     [[nodiscard]] const std::vector<std::uint32_t>& order() const noexcept { return order_; }
 
     /// The box around everything.

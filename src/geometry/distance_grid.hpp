@@ -39,7 +39,7 @@ public:
             count *= cells;
             half_diagonal_ += 0.25 * side_[k] * side_[k];
         }
-        half_diagonal_ = std::sqrt(half_diagonal_) * (1 + 1e-9);  // and the rounding of a place
+        half_diagonal_ = std::sqrt(half_diagonal_) * (1 + 1e-9);  // allows for the rounding of p
         values_.reserve(count);
         for (std::size_t i = 0; i < count; ++i) {
             values_.push_back(rounded_down(distance(centre(i)) - error));

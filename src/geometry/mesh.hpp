@@ -18,7 +18,7 @@ struct Mesh {
 };
 
 /// Reads a mesh in the format OFF (it begins with that word) or Wavefront OBJ (lines `v` and
-/// `f`; others are passed over). Faces of more than three vertices are cut into triangles
+/// `f`; other lines are ignored). Faces of more than three vertices are cut into triangles
 /// from their first vertex.
 /// @throws std::invalid_argument naming the line that is not understood or the face whose vertex
 /// does not exist.
@@ -29,7 +29,7 @@ struct Mesh {
 /// exactly one other face in the opposite direction.
 void require_closed(const Mesh& mesh);
 
-/// How often the surface of a closed mesh winds around p, from the solid angles of its faces
+/// Winding number of the surface of a closed mesh around p, from the solid angles of its faces
 /// (Van Oosterom and Strackee, IEEE Trans. Biomed. Eng. 30, 1983, eq. 8): 0 outside; 1 or -1
 /// inside of a simple surface, by the way its faces run. Not defined on the surface.
 [[nodiscard]] int winding_number(const Mesh& mesh, const Eigen::Vector3d& p);

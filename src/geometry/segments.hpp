@@ -1,4 +1,4 @@
-// Segments in the plane: which of many is nearest to a point, or to another segment?
+// Nearest-neighbour queries among segments in the plane, for a point or another segment.
 #pragma once
 
 #include <array>

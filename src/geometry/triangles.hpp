@@ -1,4 +1,4 @@
-// Triangles in space: which is nearest to a point, and how near are two rigid meshes?
+// Triangles in space: the nearest one to a point, and the distance of two rigid meshes.
 #pragma once
 
 #include <Eigen/Core>

@@ -64,7 +64,7 @@ LazyTape::LazyTape(std::size_t states, const Recording& as_called, std::vector<i
     inverses_.assign(tape_.ops_count, 0);
 }
 
-/// The operand that an operation merely repeats, or -1. An operation that is always zero becomes a
+/// The operand that an operation only repeats, or -1. An operation that is always zero becomes a
 /// constant; derivatives by dual numbers contain many of both.
 int LazyTape::repeated(TapeOp& op, double& constant) const
 {

@@ -2,8 +2,8 @@
 //
 //     x_0 = x,  x_k+1 = max(0, W_k x_k + b_k),  y = W_n x_n + b_n
 //
-// The class holds a shape and its arithmetic; parameters, gradients and the layers' outputs lie in
-// memory of the caller, so that a group of networks can share one vector, and threads one network.
+// The class holds a shape and its arithmetic. The caller owns the memory of parameters, gradients
+// and layer outputs, so that several networks can share one vector, and threads one network.
 #pragma once
 
 #include <cstddef>

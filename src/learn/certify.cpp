@@ -221,7 +221,7 @@ private:
                      margin);
     }
 
-    /// Repeats a proof that failed, farther away from counterexamples.
+    /// Repeats a proof that failed, with a threshold farther below the counterexamples.
     CertifyOutcome search_and_prove(double margin)
     {
         constexpr int attempts = 6;

@@ -12,7 +12,7 @@ namespace {
 constexpr std::string_view magic = "ricochet training checkpoint 1\n";
 constexpr std::string_view gate_magic = "ricochet gate checkpoint 1\n";
 
-// One list of members serves both directions.
+// One list of members serves both reading and writing.
 template <class Stream, class Member>
 void fields(Member&& member, Stream&& c)
 {

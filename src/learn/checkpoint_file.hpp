@@ -77,7 +77,7 @@ private:
 void write_checkpoint(std::string_view first_line, const Writer& writer,
                       const std::filesystem::path& file);
 
-/// Keeps a training in its checkpoint, again and again. A disk that fills up later does not end the
+/// Saves a training to its checkpoint repeatedly. A disk that fills up later does not end the
 /// training: the failure is remembered, and the next checkpoint is another attempt.
 class Keeper {
 public:

@@ -68,9 +68,9 @@ struct AdamStep {
     T polyak;
 };
 
-/// The quantile Huber loss of n quantiles against m targets, as in W. Dabney et al.,
-/// "Distributional
-/// reinforcement learning with quantile regression", AAAI 2018, equation 10, with kappa = 1:
+/// The quantile Huber loss, with kappa = 1, of n quantiles against m targets (W. Dabney et al.,
+/// "Distributional reinforcement learning with quantile regression", AAAI 2018,
+/// equation 10):
 ///
 ///     L = scale sum_ij w_ij huber(d_ij),  d_ij = target_j - quantile_i,
 ///     w_ij = above_i for d_ij > 0, below_i for d_ij < 0

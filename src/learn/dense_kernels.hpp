@@ -231,9 +231,9 @@ void adam(const AdamStep<T>& s) noexcept
     }
 }
 
-/// A few registers of quantiles against all targets: writes the slopes, or returns the loss. Where
-/// d is clipped to c in [0, 1] or
-/// [-1, 0], the slope is -w c and the loss w c (d - c / 2).
+/// Evaluates a few registers of quantiles against all targets: writes the slopes, or returns the
+/// loss. With c = d clipped to [0, 1] or to [-1, 0], the slope is -w c and the loss
+/// w c (d - c / 2).
 template <class T, std::size_t Registers, bool Loss>
 RICOCHET_ALWAYS Vector<T> quantile_block(const QuantileHuber<T>& q, std::size_t i) noexcept
 {

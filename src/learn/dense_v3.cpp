@@ -1,5 +1,5 @@
 // The kernels for AVX2 and FMA: compile with -march=x86-64-v3.
-// Without these instructions, as on other processors, there are none.
+// On processors without these instructions the library has no such kernels.
 #define RICOCHET_DENSE_NAMESPACE dense_library_v3
 #define RICOCHET_DENSE_REGISTER 32
 #include "dense.hpp"

@@ -1,5 +1,5 @@
 // The kernels for AVX-512: compile with -march=x86-64-v4.
-// Without these instructions, as on other processors, there are none.
+// On processors without these instructions the library has no such kernels.
 #define RICOCHET_DENSE_NAMESPACE dense_library_v4
 #define RICOCHET_DENSE_REGISTER 64
 #include "dense.hpp"

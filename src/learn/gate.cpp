@@ -63,7 +63,7 @@ public:
             return true;
         }
         Adam adam(network_.parameters().size(), {});
-        best_cost_ = infinity;  // more states may have made the best choice too bold
+        best_cost_ = infinity;  // with more states the best thresholds may be too high
         std::size_t since_best = 0;
         std::size_t i = 0;
         const bool goes_on = resumed_ && round == resumed_->round;

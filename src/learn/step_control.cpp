@@ -14,7 +14,7 @@ namespace {
 
 constexpr double inf = std::numeric_limits<double>::infinity();
 constexpr double final_margin = 0.05;  // of the logarithm of work
-constexpr double tiny = 1e-12;         // below it all errors are equal
+constexpr double tiny = 1e-12;         // errors below this count as equal
 
 /// Tolerances of the classical curves.
 std::vector<double> fine_tolerances()
@@ -40,7 +40,7 @@ struct Mean {
     double work = 0;         ///< mean of the logarithm
     double error = 0;        ///< mean of the logarithm
     double final_error = 0;  ///< logarithm of the root mean square
-    double failed = 0;       ///< share
+    double failed = 0;       ///< fraction of runs that did not reach the end
 };
 
 Mean mean_of(const std::vector<const StepProblem*>& problems, const StepRule& rule)

@@ -14,7 +14,7 @@ namespace ricochet::learn {
 
 class TrainedVector {
 public:
-    /// @param followed  has a target
+    /// @param followed  whether to keep a target copy
     TrainedVector(std::size_t n, bool followed)
         : values_(n), first_(n), second_(n), target_(followed ? n : 0)
     {

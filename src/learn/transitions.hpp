@@ -89,7 +89,7 @@ struct Transitions {
     {
     }
 
-    /// Row i becomes this transition.
+    /// Stores this transition in row i.
     void set(std::size_t i, const float* state_action_next_reward_terminal)
     {
         const float* from = state_action_next_reward_terminal;

@@ -144,9 +144,9 @@ Location Search::located(const TwoSum& root)
     return where;
 }
 
-/// A root that the noise of the guard hides for as long as `noise` [s]. Extrapolated along the
-/// flow, the guard has left its side at the end of the bracket; that end is moved until the guard
-/// has left at the state there, too.
+/// Location of a root that noise of the guard hides for `noise` [s]. Along the flow the guard has
+/// left its side at the end of the bracket, which is moved until the guard of the state there has
+/// left it, too.
 Location Search::hidden(double rate, double noise)
 {
     auto& [lo, hi] = bracket_;

@@ -89,7 +89,7 @@ struct NoisePlace {
 
 /// If the guard near `place` is noise of about its residue: narrows the bracket to a change of
 /// side there, and returns the time [s] over which the noise hides the root; else 0. `sample`
-/// is the last that `value_and_rate` took, and the motion is taken as straight from there.
+/// is the last sample of `value_and_rate`, from which the motion is taken as straight.
 [[nodiscard, gnu::noinline]] inline double close_in_noise(GuardPath& path,
                                                           const GuardSample& sample,
                                                           const NoisePlace& place,

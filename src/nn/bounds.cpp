@@ -161,7 +161,7 @@ NetworkBounds::Place NetworkBounds::place(const double* lower, const double* upp
         const double half = std::max(middle - lower[i], upper[i] - middle);
         const double scale = std::fabs(scale_[i]);
         at.centre[i] = (middle - offset_[i]) * scale_[i];
-        // Two roundings of the centre, one of `half`, and those of this line.
+        // Covers two roundings of the centre, one of `half`, and those of this line.
         at.radius[i] =
             scale * half * (1 + 8 * unit) + 8 * unit * std::fabs(at.centre[i]) + underflow;
     }

@@ -1,5 +1,5 @@
 // The kernels for AVX2: compile with -march=x86-64-v3.
-// Without these instructions, as on other processors, it has none.
+// On processors without these instructions the library has no such kernels.
 #define RICOCHET_KERNEL_NAMESPACE library_v3
 #include "kernels.hpp"
 

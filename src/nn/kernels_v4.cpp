@@ -1,5 +1,5 @@
 // The kernels for AVX-512: compile with -march=x86-64-v4.
-// Without these instructions, as on other processors, it has none.
+// On processors without these instructions the library has no such kernels.
 #define RICOCHET_KERNEL_NAMESPACE library_v4
 #include "kernels.hpp"
 

@@ -1,4 +1,4 @@
-// The header of a safetensors file: which tensors it holds and where, and its metadata.
+// The header of a safetensors file: names and places of its tensors, and its metadata.
 #pragma once
 
 #include <cstddef>

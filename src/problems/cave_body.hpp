@@ -73,7 +73,7 @@ public:
     /// touches the cave at the start.
     explicit CaveBody(const Parameters& parameters);
 
-    /// These meshes; refinements and sizes are not used. The body begins where it is.
+    /// Uses these meshes, not refinements and sizes. The body starts at its given position.
     /// @throws std::invalid_argument also for a mesh that is empty, open or has a
     /// coordinate that is not a number, naming the face, and for a body that is not inside of the
     /// cave.

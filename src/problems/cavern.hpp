@@ -72,7 +72,7 @@ public:
     /// does not fit around the origin.
     explicit Cavern(const Parameters& parameters);
 
-    /// A cavern with this wall. `segments`, `seed` and `size` are not used.
+    /// Makes a cavern with this wall. `segments`, `seed` and `size` are not used.
     /// @throws std::invalid_argument also if the vertices are no polygon around the ball at
     /// the origin.
     Cavern(const Parameters& parameters, const std::vector<geometry::Point2>& wall);
@@ -80,7 +80,7 @@ public:
     static constexpr std::string_view name = "cavern";
     static constexpr bool unilateral = true;
 
-    /// At the origin, to the right with the launch speed.
+    /// Initial state: at the origin, moving to the right at the launch speed.
     [[nodiscard]] State start() const noexcept { return {0, 0, p_.launch_speed, 0}; }
     [[nodiscard]] double top_speed() const noexcept { return top_speed_; }
     [[nodiscard]] const Parameters& parameters() const noexcept { return p_; }

@@ -11,7 +11,7 @@
 
 namespace ricochet {
 
-/// Problem F2 of the DETEST collection: a relaxation whose rate takes turns.
+/// Problem F2 of the DETEST collection: a relaxation with two alternating rates.
 ///
 /// State (y), dimensionless; modes even and odd, of the whole part of t.
 ///

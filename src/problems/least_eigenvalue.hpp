@@ -45,7 +45,7 @@ public:
         double level = 1.3;      ///< of the eigenvalue
         double amplitude = 1;    ///< of the loads, positive
         double frequency = 0.7;  ///< [rad/s] of the slowest load, positive
-        double slow = 0;         ///< [s] that a call of the guard takes longer, at most 1
+        double slow = 0;         ///< [s] time added to each call of the guard, at most 1
         std::uint64_t seed = 1;  ///< of the matrices
         std::size_t table = 0;   ///< cells along a load, at most 48; 0: no bounds of the value
     };

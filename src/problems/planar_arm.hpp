@@ -72,7 +72,7 @@ public:
     /// @throws std::invalid_argument if a parameter is outside its range.
     ArmScene(const Parameters& parameters, std::size_t joints);
 
-    /// Among these obstacles, polygons that are not nested. `obstacles` is not used.
+    /// Uses these obstacles, polygons that are not nested, in place of the random ones.
     /// @throws std::invalid_argument also for an obstacle that is no polygon, or that is closer
     /// to the arm at its start than the clearance, by number.
     ArmScene(const Parameters& parameters, std::size_t joints,
@@ -180,7 +180,7 @@ public:
         return {.name = "obstacle", .unilateral = true};
     }
 
-    /// At rest, folded around the base.
+    /// Initial state: at rest, folded around the base.
     [[nodiscard]] State start() const noexcept
     {
         State x{};

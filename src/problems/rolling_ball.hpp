@@ -69,15 +69,15 @@ public:
         return sets::Box<2>({-force, -torque}, {force, torque});
     }
 
-    /// When it begins to roll [s] after a start with spin 0 at `faster` > 0 [m/s] than the plate,
-    /// for friction radius > resistance.
+    /// Time [s] at which the ball begins to roll, for a start with spin 0 that is faster than the
+    /// plate by `faster` > 0 [m/s], for friction radius > resistance.
     [[nodiscard]] double rolling_time(double faster) const noexcept
     {
         return faster /
                (3.5 * p_.friction * p_.gravity - 2.5 * p_.resistance * p_.gravity / p_.radius);
     }
 
-    /// When it comes to rest on the plate after the same start.
+    /// Time [s] at which the ball comes to rest on the plate after the same start.
     [[nodiscard]] double rest_time(double faster) const noexcept
     {
         const double t = rolling_time(faster);

@@ -15,8 +15,8 @@ namespace ricochet {
 /// mass: the restricted three-body problem, in the frame that turns with them and in
 /// units of their distance, their mass and their angular velocity.
 ///
-/// State (x, y, vx, vy). With m the share of the Moon, which is at (1 - m, 0), n = 1 - m
-/// that of the Earth at (-m, 0), and r1, r2 the distances from Earth and Moon,
+/// State (x, y, vx, vy). With m the mass fraction of the Moon, which is at (1 - m, 0), n = 1 - m
+/// the fraction of the Earth, at (-m, 0), and r1, r2 the distances from Earth and Moon,
 ///
 ///     flow    x'' = x + 2 y' - n (x + m) / r1³ - m (x - n) / r2³
 ///             y'' = y - 2 x' - n y / r1³ - m y / r2³

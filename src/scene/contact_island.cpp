@@ -341,8 +341,8 @@ ContactIsland::Plan ContactIsland::plan(double until)
     return {IslandOutcome::reached, planned_};
 }
 
-/// Whether this step is the last of as many without contact as the patience requires. It is not
-/// taken: the scene goes on from where contact has ended, or from where patience has.
+/// Whether this step is the last of the steps without contact that the patience requires. It is not
+/// taken: the scene continues from the time at which contact, or patience, has ended.
 bool ContactIsland::is_released() const
 {
     if (!impulses_.isZero(0)) return false;

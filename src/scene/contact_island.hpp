@@ -19,10 +19,10 @@
 //  - distances of discs from discs, lines and segments are convex, and their linear model is below
 //    them: no gap of a step's end is negative beyond rounding, whatever the step;
 //  - with walls at rest the energy never grows beyond rounding: a step loses |v+ - v|^2 M / 2, the
-//    work of friction and p_n g/h. This costs the order: it is 1;
+//    work of friction and p_n g/h. The price is that the rule is of order 1;
 //  - a step is a straight line q + s v+, with the velocity v + s (v+ - v)/h, which may be cut at
-//  any
-//    s in [0, h]: energy is convex along it. The scene meets members in closed form.
+//    any s in [0, h], since the energy is convex along it. The scene therefore finds impacts of
+//    other bodies on the group in closed form.
 #pragma once
 
 #include <array>
@@ -46,13 +46,13 @@ struct IslandStatistics {
     std::uint64_t dense = 0;     ///< problems that only the dense solver could solve
     std::uint64_t wedged = 0;    ///< problems solved with overlaps by rounding left in place
     std::uint64_t halvings = 0;  ///< steps tried again at half the length
-    std::uint64_t spent = 0;     ///< arrivals whose rebound would have been shorter than a step
+    std::uint64_t spent = 0;     ///< impacts without rebound, as it would be shorter than a step
     std::uint64_t slept = 0;
     std::uint64_t slept_by_speed = 0;  ///< of these below `sleep_speed`, not at exact rest
     double largest_residual = 0;
     double largest_error = 0;  ///< [m] of a step, where errors are estimated
     double sum_of_errors = 0;  ///< [m]
-    double projected = 0;      ///< [m] the farthest that a body was moved onto its surface
+    double projected = 0;      ///< [m] largest displacement of a body onto its surface
 };
 
 /// Result of `ContactIsland::strike`.

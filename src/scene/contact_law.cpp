@@ -64,7 +64,7 @@ void ContactLaw::push(const LawContact& c, double normal, double tangential, Eig
     b[2 * c.second + 1] -= y;
 }
 
-/// The inertia against which a contact pushes, without springs [kg].
+/// Effective inertia [kg] of the bodies at a contact, without springs.
 double ContactLaw::unit(const LawContact& c) const
 {
     const double first = problem_->inertia[static_cast<std::size_t>(c.first)];

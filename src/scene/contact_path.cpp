@@ -29,7 +29,7 @@ void ContactLaw::begin_path(const Eigen::VectorXd& p, const Eigen::VectorXd& v)
         const double rho = stiffness_ * unit(c);
         const double normal = p[i] - rho * u.normal;
         const double tangential = p[i + 1] - rho * u.tangential;
-        // Keeps off the boundaries between states, at a distance that no two contacts share.
+        // Stays off the boundaries between states, at a different distance for each contact.
         const double part = std::fmod(0.618033988749895 * static_cast<double>(k + 1), 1.0);
         const double margin = 1e-3 * (1 + part) * scale_ * std::sqrt(unit(c));
         const double bound = c.friction * p[i];
@@ -80,7 +80,7 @@ void ContactLaw::turn_path()
     }
 }
 
-/// The first contact to change along the path.
+/// Finds the first contact that changes its state along the path.
 ContactLaw::Switch ContactLaw::next_switch() const
 {
     Switch first{.after = std::numeric_limits<double>::infinity()};
@@ -121,7 +121,7 @@ ContactLaw::Switch ContactLaw::next_switch() const
     return first;
 }
 
-/// Moves to that change and beyond it. Where the path would turn back into the state that it has
+/// Moves the path to that change and past it. If it would turn back into the state that it has just
 /// left, it continues in the opposite sense.
 void ContactLaw::pass(const Switch& next)
 {
@@ -147,7 +147,7 @@ void ContactLaw::pass(const Switch& next)
     path_.w_rate = -path_.w_rate;
 }
 
-/// Follows the path until nothing of the shift is left; false where it does not get there.
+/// Follows the path until the shift is zero; false if it does not get there.
 bool ContactLaw::follow_path(LawReport& report)
 {
     if (!factor()) return false;

@@ -168,7 +168,7 @@ IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Inst
     group.planned = true;
     group.start = now;
     group.end = now.after(length);
-    // The rounding left at the end of the run is no step.
+    // A remainder of rounding at the end of the run is not a step.
     const bool over = seconds(group.end, t_end) <= resolution(t_end);
     if (length == left || (over && outcome != IslandOutcome::impact)) group.end = t_end;
     if (asleep && !(wakes < never)) group.end = t_end;

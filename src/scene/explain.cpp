@@ -1,4 +1,4 @@
-// Explains what a run would do, and what it would not.
+// Describes how a scene would be run, and which tests would be skipped.
 #include <fmt/format.h>
 
 #include <algorithm>

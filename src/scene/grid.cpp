@@ -9,8 +9,8 @@ namespace ricochet::detail {
 
 namespace {
 
-/// With no more than these there are no cells: all of so few are tested, and none pays for crossing
-/// cells.
+/// Up to this number of bodies there are no cells: testing all pairs costs less than the crossings
+/// from cell to cell.
 constexpr double few_bodies = 16;
 constexpr std::size_t few_faces = 64;
 constexpr double boundless = 0x1p200;

@@ -75,9 +75,9 @@ class Impacts {
 public:
     explicit Impacts(World& world) : world_(world) {}
 
-    /// Applies Newton's law by waves, or for all together. Restitution is set to 0 in a cluster
-    /// that does not terminate, and with `spend` from the start; a cluster with lasting contact is
-    /// left sooner, with contacts that still approach. Returns whether it was left.
+    /// Applies Newton's law by waves, or to all contacts together. Restitution is set to 0 if the
+    /// waves do not terminate, and from the start if `spend`. In a cluster with lasting contact the
+    /// waves stop earlier, with contacts that still approach. Returns whether they did so.
     bool resolve(Cluster& cluster, double t, bool spend, std::vector<SceneEvent>* events);
 
 private:

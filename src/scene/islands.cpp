@@ -11,8 +11,8 @@ namespace ricochet::detail {
 
 namespace {
 
-/// This many consecutive steps, each this small a fraction of the run, are taken as its typical
-/// steps: a run of 10^8 steps takes half a minute or more.
+/// A run counts as hopeless after this many consecutive steps, each shorter than this fraction of
+/// the run: 10^8 such steps take half a minute or more.
 constexpr std::uint32_t most_short_steps = 1000;
 constexpr double short_part = 1e-8;
 

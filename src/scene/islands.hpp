@@ -36,7 +36,7 @@ public:
     /// Takes the next step of an island; its members get new records. False where no step is short
     /// enough, or the result is not finite.
     bool advance(std::uint32_t island);
-    /// Whether its steps have become so short that it would hardly ever reach the end.
+    /// Whether the steps of an island have become so short that it will hardly reach the end.
     [[nodiscard]] bool stalls(std::uint32_t island) const;
 
     /// Continues an island from t with changed velocities of some members: the current step is cut
@@ -44,7 +44,7 @@ public:
     bool restart(std::uint32_t island, const Instant& t,
                  const std::vector<std::pair<std::uint32_t, Vector2>>& velocities);
 
-    /// From now on its members advance as part of a group in lasting contact.
+    /// Suspends an island: its members now advance as part of a group in lasting contact.
     void suspend(std::uint32_t island);
     /// Continues a suspended island from t with these positions and velocities, in the order of its
     /// members.
@@ -61,7 +61,7 @@ public:
     /// Marks the island of one body that can meet neither a body nor a surface.
     void set_unseen(std::uint32_t island) { islands_[island].unseen = !islands_[island].system; }
 
-    // --- systems: islands whose members are the discs of one ---
+    // --- systems: the members of such an island are the discs of one system ---
 
     [[nodiscard]] bool is_system(std::uint32_t island) const
     {
@@ -75,7 +75,7 @@ public:
     /// Changes of the velocity of disc `of` when disc `by` is pushed by (1, 0) and by (0, 1).
     [[nodiscard]] std::array<Vector2, 2> mobility(std::uint32_t of, std::uint32_t by,
                                                   const Instant& t) const;
-    /// The reason why an island did not continue, if it is more than that its steps became short.
+    /// Reason why an island did not continue, unless it is only that its steps became too short.
     struct Trouble {
         Outcome outcome = Outcome::step_underflow;
         std::string what;  ///< of its first member

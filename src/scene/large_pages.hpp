@@ -1,5 +1,5 @@
-// Memory of many bodies and events in large pages, where the system provides them: a million of
-// them touch 100 000 small pages, each of which costs the system more than the arithmetic.
+// Memory for many bodies and events in large pages, where the system provides them. A million
+// bodies touch 100 000 small pages, each of which costs the system more than the arithmetic.
 #pragma once
 
 #include <cstdint>

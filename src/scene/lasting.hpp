@@ -1,5 +1,5 @@
-// Lasting contact as the loop sees it: a library of its own makes and advances such groups, and the
-// loop knows only these two interfaces.
+// Interfaces between the loop of a scene and the separate library that makes and advances groups of
+// bodies in lasting contact.
 #pragma once
 
 #include <array>

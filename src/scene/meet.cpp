@@ -23,7 +23,7 @@ namespace {
     return c;
 }
 
-/// Distance that the path can lead away from its start within `until`.
+/// Bound of the distance from its start that the path reaches within `until`.
 [[nodiscard]] double reach_of(const Path& path) noexcept
 {
     double sum = 0;
@@ -224,7 +224,7 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
                                : falls_after(gap, rate, 2 * bend, closed);
         if (!(beside && meeting.after == never) && lands(meeting.after, above)) return meeting;
         if (bend <= 0 || rate >= 0) return {};
-        // The body passes its end, and comes back from behind.
+        // The body passes the end of the segment, and comes back from behind.
         const double behind = -(gap + 2 * b.radius);
         const double square = rate * rate + 4 * bend * behind;
         if (!(square > 0)) return {};
@@ -265,7 +265,7 @@ Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
     const bool steps = std::isfinite(path.until);
     Meeting meeting{.from = b.t};
     if (steps && norm(apart.c[0]) - b.radius > reach_of(path)) return meeting;
-    // The direction to the vertex is rounded as the places of both are.
+    // The direction to the vertex has the rounding of the positions of both.
     const double slowest = noise(path.c[1], {}) * b.radius + norm(path.c[1]) * rounding;
     if (now.at_once <= now.tolerance && std::fabs(now.rate) <= slowest) {
         now.rate = 0;

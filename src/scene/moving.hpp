@@ -31,8 +31,8 @@ struct Closing {
 
 /// The first s in [0, until] at which a gap is closed and closes further. `pair` has
 ///
-///     look(s)       the gap at s
-///     safe(gap)     [s] time after the last look for which an open gap provably cannot close
+///     look(s)       evaluates the gap at s
+///     safe(gap)     [s] time after the last evaluation in which an open gap provably stays open
 ///     linger(gap)   [s] the same for a closed gap, until it can be exceeded by as much again
 ///     next_jump(s)  next time at which the rate may jump; the bounds hold up to there
 ///

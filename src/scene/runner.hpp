@@ -35,8 +35,8 @@ struct GroupResult {
 /// State of all bodies of a group at a sample time.
 using Samples = std::vector<std::vector<BodyState>>;
 
-/// A value for each body of a group, in memory for the labels between its first and its last: the
-/// values of a body that is alone are always in the same place.
+/// A value for each body of a group, in memory for all labels from its first to its last. The value
+/// of a body that is alone is always in the same place in memory.
 template <class Value>
 class OfGroup {
 public:
@@ -63,7 +63,7 @@ class Runner {
 public:
     Runner(World& world, double t_end);
 
-    /// @param events   to which those of this group are appended
+    /// @param events   the events of this group are appended to it
     /// @param samples  a row for each of the options' sample times, whose bodies of this group are
     ///                 filled in as far as the group runs
     GroupResult run(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events,

@@ -155,7 +155,7 @@ void Runner::note_group(SceneEvent::Kind kind, std::uint32_t i)
     result_.events.push_back(event);
 }
 
-/// Plans the next step of a group, and the meetings of its members in it.
+/// Plans the next step of a group, and predicts the impacts of its bodies during that step.
 void Runner::plan_group(std::uint32_t number)
 {
     const bool slept = world_.bodies[contacts_[number].members[0]].asleep;
@@ -200,7 +200,7 @@ void Runner::step_group(std::uint32_t number)
     if (!divide(number)) plan_group(number);
 }
 
-/// Resolves members that meet at a speed from which they rebound: an impact like any other.
+/// Resolves an impact between bodies of one group that meet fast enough to rebound.
 void Runner::arrive(std::uint32_t number)
 {
     const std::uint32_t first = contacts_[number].motion->arrivals().at(0).first;
@@ -241,7 +241,7 @@ bool Runner::may_leave(std::uint32_t number, std::uint32_t i) const
     return contacts_.exists(number);
 }
 
-/// Divides a group that has fallen apart, and stayed so for some steps, into several.
+/// Splits a group whose parts have been apart for some steps into several groups.
 bool Runner::divide(std::uint32_t number)
 {
     Contacts::Group& group = contacts_[number];

@@ -12,7 +12,7 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Number of a body's impacts within the resolution of the time each after which a cluster
+/// After this many impacts of a body at mean intervals within the resolution of time, its cluster
 /// collapses.
 constexpr std::uint32_t crowded = 64;
 
@@ -92,7 +92,7 @@ void Runner::add_couplings()
 }
 
 /// Segments that a point touches now, and its side of each, from the record that has led there;
-/// `sure` is one of them at any distance, and the first.
+/// the segment `sure` is the first of them, at any distance.
 std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
 {
     std::vector<Side> sides;
@@ -100,7 +100,7 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
     if (body.radius > 0 || !celled_ || !grid_.any_faces()) return sides;
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = world_.velocity(i, now_);
-    // A long flight and its height have larger roundings than its end.
+    // The rounding of a long, high flight exceeds that of its end point.
     const double s = seconds(body.t, now_);
     const double flown = 4 * epsilon * s * (norm(body.v) + s * norm(body.a));
     for (const std::uint32_t f : grid_.faces(body)) {
@@ -122,7 +122,7 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
     return sides;
 }
 
-/// Gathers contacts of a body of the cluster with faces; the face `sure` touches at any gap.
+/// Gathers contacts of a body of the cluster with faces; `sure` counts as touched at any gap.
 void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
 {
     const std::uint32_t i = cluster_.bodies[slot];

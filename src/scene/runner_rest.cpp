@@ -90,7 +90,7 @@ void Runner::settle(std::uint32_t i, std::uint32_t was)
         return;
     }
     if (chosen == none) {
-        // No single face carries it, so it lies in the corner of two.
+        // No single face carries the body, so it lies in the corner of two faces.
         body.v = body.a = {};
         body.asleep = true;
         body.held = chosen = holding[0];
@@ -108,7 +108,7 @@ bool Runner::rests_on_face(std::uint32_t i)
     return body.held != none;
 }
 
-/// Considers the times when friction stops it, or its face ends.
+/// Predicts the times when friction stops a sliding body, or when its face ends.
 void Runner::consider_own(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];

@@ -75,7 +75,7 @@ void World::make_one(std::vector<Side>& sides) const
 
 void World::remember(Body& body, const std::vector<Side>& sides) const
 {
-    // Twenty times, because of the rounding at a corner.
+    // Repeated up to twenty times: at a corner, moving onto one line may leave another by rounding.
     for (int k = 0; k < 20; ++k) {
         bool moved = false;
         for (const Side& side : sides) {
@@ -122,7 +122,7 @@ bool World::passes_end(const Body& body, std::uint32_t f, bool above, const Vect
         const bool side = arrives_above(body, other, p, v) == above ? above : !up;
         if (side != above) return true;
         if (side == up || inside > end_slack(face, p)) continue;
-        // At an outer corner only a motion behind both segments strikes.
+        // At an outer corner a point strikes only if it moves behind both segments.
         const double rate = dot(v, beside.normal) * (side ? 1 : -1);
         if (rate >= -noise(v, {})) return true;
     }

@@ -63,7 +63,7 @@ namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-/// Below this fraction of the largest a singular direction is one along a family of
+/// Singular values below this fraction of the largest belong to directions along a family of
 /// orbits: the monodromy matrix is known to about 1e-12.
 constexpr double rank_threshold = 1e-9;
 

@@ -61,7 +61,7 @@ struct RuleRow {
     StepTrial trial{};
     double seconds = 0;
     bool reached = false;
-    int given_up = 0;  ///< number of settings given up because time stood still
+    int given_up = 0;  ///< number of settings given up because the run stalled
 };
 
 /// A problem that the policy of its system was not trained for.

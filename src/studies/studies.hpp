@@ -12,8 +12,8 @@ namespace ricochet::app {
 [[nodiscard]] double seconds_of(const std::function<void()>& work, double enough);
 
 /// `compare step-control`: rules that choose steps, at equal true error. Prints for every rule the
-/// coarsest setting from which on its error stays below the target, and what that takes.
-/// @return 0 if every rule got there, else 1.
+/// coarsest setting from which on its error stays below the target, and the work that it takes.
+/// @return 0 if every rule reached the target, else 1.
 /// @throws BadInput or ModelError.
 int compare_step_control(const CompareRequest& request);
 

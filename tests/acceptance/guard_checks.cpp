@@ -1,4 +1,4 @@
-// Acceptance checks of skipping the checks of expensive guards.
+// Acceptance checks of detectors that skip evaluations of expensive guards.
 #include <vector>
 
 #include "certificates.hpp"

@@ -38,7 +38,7 @@ struct Check {
 /// The interface for C; none if it is not built.
 [[nodiscard]] std::vector<Check> c_checks();
 
-/// The monitor in other people's integrators; none without SUNDIALS.
+/// The monitor in the integrators of other libraries; none without SUNDIALS.
 [[nodiscard]] std::vector<Check> host_checks();
 
 /// Taylor's method.
@@ -66,7 +66,7 @@ struct Check {
 /// Events where guards accumulate, decay, or move faster than the state.
 [[nodiscard]] std::vector<Check> resolution_checks();
 
-/// Many bodies with a clock each.
+/// Scenes of many bodies, each with its own time.
 [[nodiscard]] std::vector<Check> scene_checks();
 
 /// Scenes: cost by dopri5, beside common steps and plain runs; labels, reversal, brute force,
@@ -94,7 +94,7 @@ struct Check {
 [[nodiscard]] Measured hand_over_sliding_mode();
 [[nodiscard]] Measured hand_over_circuit();
 
-/// Their run times at the requested errors, and those of Bathe's steps.
+/// Run times of the two systems at the requested errors, also with Bathe's steps.
 [[nodiscard]] Measured time_circuit_to_1e8();
 [[nodiscard]] Measured time_sliding_mode();
 [[nodiscard]] Measured time_bathe_on_circuit();

@@ -25,8 +25,8 @@ namespace {
 
 using State = BouncingBall::State;
 
-/// Balls that are equal to the bit: all of them bounce together, when a single one
-/// would.
+/// Whether balls with bitwise equal states bounce at the same instants, which are those of a single
+/// ball.
 template <class Stepping>
 bool bounce_together(std::string_view method, std::size_t n, const Options& options,
                      const Stepping& stepping, std::vector<std::string>& details)

@@ -1,4 +1,4 @@
-// Savings and misses of trained gates. Guards are counted instead of waited for: a guard of 50 us
+// Savings and misses of trained gates. Guard calls are counted, not waited for: a guard of 50 us
 // costs its calls times 50 us, compared with which the steps (0.1 us) and the networks (0.2 us a
 // call) are negligible; the time of the gates is printed.
 #include "measure_gates.hpp"

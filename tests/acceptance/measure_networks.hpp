@@ -46,8 +46,8 @@ struct SameEvents {
 };
 
 // Rivals are compiled in the same way: in one function each, and with a type local to this source.
-// Inlined in one place and called in another, or taken from the object file of another source, the
-// same loop takes up to an eighth less or more.
+// The time of a loop changes by up to an eighth if it is inlined in one place and called elsewhere,
+// or linked from the object file of another source.
 namespace {
 
 template <class System>

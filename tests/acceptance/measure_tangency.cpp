@@ -1,4 +1,4 @@
-// Near-tangent crossings: from a hundredth deep down to the touch band, and misses.
+// Near-tangent crossings, of depths from 0.01 down to the touch tolerance, and near misses.
 //
 //     y'' = -y,  y = cos(t + p),  guard y - (1 - depth),  over 20 s
 //
@@ -28,8 +28,8 @@ constexpr double t_end = 20;
 constexpr int phases = 2000;
 constexpr double two_pi = 6.283185307179586;
 
-/// Largest |g| + where the guard turns that counts as a touch: 64 units in the last place
-/// of the guard's size, which is 2 at a trough.
+/// Touch tolerance: a turn of the guard with |g| up to this counts as a touch. It is 64 units in
+/// the last place of the guard's size, which is 2 at a trough.
 constexpr double band = 64 * std::numeric_limits<double>::epsilon() * 2;
 
 const Options options{.t_end = t_end, .rtol = 1e-14, .atol = 1e-15};

@@ -22,8 +22,8 @@ namespace {
 
 constexpr double discount = 0.9;
 
-/// Several x⁺ = x + a / 2 with one action, all of them seen, and
-/// a reward of minus the mean of x^2 + a^2 / 2. Cut after `length` steps, 0 for never.
+/// Several systems x⁺ = x + a / 2 under one common action, with all states observed and a reward
+/// of minus the mean of x^2 + a^2 / 2. Episodes are cut after `length` steps; 0: never.
 class Regulators {
 public:
     Regulators(std::size_t n, int length) : x_(n), length_(length) {}
@@ -121,7 +121,7 @@ double median_cost(const std::string& name, const Train& train, Measured& out)
 ///
 ///     reward -(th^2 + w^2 / 10 + u^2 / 1000),  w' = 15 sin(th) + 3 u,  |u| <= 2,  |w| <= 8,
 ///
-/// 200 steps of 0.05 s, the rate first; seen are cos th, sin th and w.
+/// 200 steps of 0.05 s, each of which updates the rate first; cos th, sin th and w are observed.
 class Pendulum {
 public:
     [[nodiscard]] learn::Environment environment()

@@ -1,5 +1,5 @@
 // Cost of watching guards: many crossings that are only recorded, and guards that
-// never fire, always compared with the same system without its guards.
+// never fire, each compared with the same system without guards.
 #include <fmt/format.h>
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// Events: none is lost where guards accumulate, decay, or move faster than the state.
+// Acceptance checks that no event is lost where guards accumulate, decay, or outpace the state.
 #include <fmt/format.h>
 
 #include <algorithm>

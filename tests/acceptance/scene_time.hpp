@@ -34,7 +34,7 @@ namespace ricochet::bench {
     return scaled(least, stick);
 }
 
-/// Time of one call relative to that of another, each the least of `turns` in turns.
+/// Ratio of the times of two calls, each the minimum over `turns` alternating repetitions.
 [[nodiscard]] inline double time_ratio(const std::function<void()>& one,
                                        const std::function<void()>& other, int turns)
 {

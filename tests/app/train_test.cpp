@@ -33,7 +33,7 @@ TEST_F(App, TrainedModelIsWrittenAndFindsThe13Impacts)
 
 TEST_F(App, ModelThatMissesEventsIsOnlyWrittenWhenAllowed)
 {
-    // After one iteration the network knows nothing.
+    // After one iteration the network has learned nothing.
     const Result refused = run(train({"--iterations", "1"}));
     EXPECT_EQ(refused.status, 1);
     EXPECT_NE(refused.err.find("events are missed"), std::string::npos) << refused.err;

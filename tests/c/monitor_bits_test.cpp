@@ -412,7 +412,7 @@ Told drive(System& system, Monitor&& monitor, const typename System::X& x0, doub
     return told;
 }
 
-/// NaN is equal to itself: a slope that was not computed.
+/// Equality in which NaN, a slope that was not computed, equals itself.
 bool same_bits(const Story& a, const Story& b)
 {
     return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;

@@ -77,7 +77,7 @@ protected:
         return std::pow(10, std::uniform_real_distribution(-6., 3.)(random_));
     }
 
-    /// Gives it the errors of steps from `h` on, some of them without a solution.
+    /// Passes the errors of steps from `h` on to a controller; some steps have no solution.
     void remember(StepController& controller, int steps, double h = 0.01)
     {
         for (int i = 0; i < steps; ++i) {

@@ -313,7 +313,7 @@ TEST_P(DetectorSuite, TwoCrossingsInOneStepAreFoundOrHonestlyAssumed)
         expect_bracket(either, dip, Side::above);
         expect_bracket(bump, dip.times(-1), Side::below);
         EXPECT_LT(first.hi.s, 0.5 + half);  // between the roots
-        // Only the way back counts.
+        // A rising crossing is only the second one.
         expect_bracket(second, dip, Side::below);
         EXPECT_GE(second.lo.s, 0.5 - half);
     }
@@ -334,7 +334,7 @@ TEST_P(DetectorSuite, ATouchIsFoundOrHonestlyAssumed)
             EXPECT_EQ(one.evidence, Evidence::assumed);
         }
     }
-    // Only the side counts from which the surface is touched.
+    // A guard above its surface cannot touch it as a rising guard does.
     EXPECT_FALSE(look(touch, Side::above, Crossing::rising).touch);
 }
 
@@ -344,7 +344,7 @@ TEST_P(DetectorSuite, AStartOnTheSurfaceIsJudgedByTheArmedSide)
     expect_clear(look(up, Side::above, Crossing::either));
     EXPECT_TRUE(look(up.times(-1), Side::above, Crossing::falling).hit);
     EXPECT_TRUE(look(up, Side::below, Crossing::rising).hit);
-    // A remainder behind the surface, on the way out of it, and one that never comes out.
+    // Starts slightly behind the surface: one that moves out of it, and one that stays behind.
     const Curve out{[](double s) { return s - 1e-12; }, [](double) { return 1.0; }};
     expect_clear(look(out, Side::above, Crossing::either));
     const Curve sunk{[](double s) { return -1e-12 - s * s; }, [](double s) { return -2 * s; }};

@@ -206,7 +206,7 @@ TEST_P(PotentialSuite, DdagIsConvexInTheSlipRateAndInTheState)
         const RateStateJet j = pair_.rate_potential(v, xi);
         EXPECT_GT(j.vv, 0);
         EXPECT_GE(j.xixi, 0);
-        // And by its values alone.
+        // The same is checked by values alone.
         const auto value = [&](double a, double b) { return pair_.rate_potential(a, b).value; };
         const double other_v = odd() ? -2 * v : 3 * v;
         const double other_xi = state();
@@ -353,7 +353,7 @@ TEST_P(PotentialSuite, WhatIsNoNumberOrHasNoFrictionIsRefused)
         EXPECT_THROW((void)pair_.rate_potential(-v, xi), std::invalid_argument);
     }
     if (pair_.kind != PotentialKind::quadratic) {
-        // No speed pulls the state that way, and none heals it as fast.
+        // No slip rate gives this sign of the force, and none heals the state this fast.
         EXPECT_THROW((void)pair_.dual(1, xi), std::invalid_argument);
         EXPECT_THROW((void)pair_.primal(1e300, xi), std::invalid_argument);
     }

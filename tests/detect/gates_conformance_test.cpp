@@ -100,7 +100,7 @@ TEST(Gate, ClearsTheLargestLevelThatItsNetworkSpeaksFor)
                 gate.ask(Shuttle{}, 0, 0, std::array<double, 2>{x, 1});
             EXPECT_EQ(answer.cleared, expected(model, x)) << x;
             EXPECT_FALSE(answer.outside);
-            // It never clears more than is true.
+            // The gate never clears a level above the true guard.
             const double wall = 1 - std::fabs(x);
             EXPECT_LE(answer.cleared, std::max(wall, 0.0));
         }

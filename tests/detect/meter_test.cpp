@@ -221,7 +221,7 @@ void expect_same_events_while_ways_change(const Shuttle& system, const Options& 
     EXPECT_EQ(checked.run.statistics.network_calls, 0U);
     EXPECT_EQ(checked.run.statistics.checks_deferred, 0U);
     EXPECT_GE(checked.run.statistics.guard_calls, exact.statistics.steps);
-    // Checks at no cost, and all the time for trials: no alternative stays for long.
+    // With free checks and all the time available for trials, the meter switches continually.
     MeterOptions restless = counted(0, 0);
     restless.trials = 1;
     for (const std::uint64_t piece : {1U, 7U, 50U}) {

@@ -109,7 +109,7 @@ struct Disc {
     double x, y, r;
 };
 
-/// A point among discs in a circular room, under gravity, reflected by what it meets. The
+/// A point among discs in a circular room, under gravity, reflected by discs and wall. The
 /// guard is its distance from the nearest of them.
 struct Room {
     using State = X;
@@ -845,8 +845,8 @@ TEST(Planned, StatesSizedAtRunTimeHaveTheEventsOfTheExactDetector)
 
 TEST(Planned, AnEventTakesFiveExactCallsToLocateOnAverage)
 {
-    // A guard with a rate of its own: after the checks of the ends of the step that holds the event
-    // there is one evaluation at each sample of Newton's method, two that close the bracket and one
+    // A guard that declares its rate. After the checks at the ends of the step with the event there
+    // is one evaluation at each sample of Newton's method, two that close the bracket and one
     // that arms the guard again.
     Room room;
     room.gravity = 0;

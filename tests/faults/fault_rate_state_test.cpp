@@ -348,7 +348,7 @@ TEST(FaultRateState, EarthquakeIsSolvedFromLoadToRest)
     EXPECT_LT(e.end - e.start, 200);
     EXPECT_LT(r.fastest.back(), 1e-8);  // locked again
     EXPECT_GT(r.rupture.mean_slip, 0.5 * e.mean_slip);
-    // Nine decades, by a few thousand steps.
+    // Velocities span nine decades, in a few thousand steps.
     EXPECT_LT(*std::min_element(r.fastest.begin(), r.fastest.end()), 1e-9);
     EXPECT_LT(r.rupture.statistics.steps, 5000U);
 
@@ -410,9 +410,9 @@ TEST(FaultRateState, OrderFourGoesOnAfterAnEarthquake)
 
 TEST(FaultRateState, OnsetIsThatOfFinerSteps)
 {
-    // Errors of each step of 1e-3 of V grow with the instability before the onset. Of order 4 the
-    // estimate is of order 3 and the steps are far better than it says: 9e-6 here; order 2 is off
-    // by 5e-4.
+    // Errors of each step of 1e-3 of V grow with the instability before the onset. The
+    // estimate of order 4 is one of order 3 and far too large: the error is 9e-6 here; order 2 is
+    // off by 5e-4.
     const StrikeSlipFault fault({.elements = 4});
     FaultFriction friction{.overload = 1e-3};
     friction.law = {.a = 0.006, .b = 0.024, .f_star = 0.6, .v_star = 1e-6, .d_rs = 0.006};

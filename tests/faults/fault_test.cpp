@@ -399,7 +399,7 @@ TEST(FaultBathe, PublishedSchemeGivesThePublishedSlips)
     EXPECT_NEAR(bathe(one, 0.1, published).mean_slip, 0.229058, 1e-6);
     EXPECT_NEAR(bathe(hundred, 0.5, published).mean_slip, 0.243671, 1e-6);
     EXPECT_NEAR(bathe(hundred, 0.1, published).mean_slip, 0.238089, 1e-6);
-    // Its controller: 237.72 mm, and 237.67 with its own loosely solved stages.
+    // With the controller of the source: 237.72 mm, and 237.67 with its own loosely solved stages.
     const Rupture controlled = bathe(hundred, 0.05,
                                      {.first_stage = FirstStage::at_end,
                                       .controller = ClassicStep{.order = 1, .up = 1.8},

@@ -5,8 +5,8 @@
 // modes, slopes, errors) and its end, and its counts. A change of the engine that is meant to keep
 // the bits keeps this file; for any other change, the commit states which lines change and why. The
 // file holds for one mathematical library, which its first line identifies by a hash of its own:
-// with another the runs and their numbers of events are compared. RICOCHET_WRITE_GOLDEN=1 writes
-// runs.txt anew.
+// with another the runs and their numbers of events are compared. RICOCHET_WRITE_GOLDEN=1 rewrites
+// runs.txt.
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

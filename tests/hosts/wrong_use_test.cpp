@@ -1,4 +1,4 @@
-// Errors of a host are reported, with the expected behaviour.
+// Wrong use of the monitor by a host is reported, with a description of the right use.
 #include <gtest/gtest.h>
 
 #include <functional>

@@ -46,7 +46,7 @@ struct TwoPhases : TwoFloors {
     static constexpr std::size_t mode_count = 2;
 };
 
-// --- what is right stays right ---
+// --- correct declarations are accepted ---
 
 struct RightInEveryWord : Falling {
     static constexpr std::size_t guard_count = 2;
@@ -330,7 +330,7 @@ TEST(Declarations, AResetThatDoesNotFitIsKnown)
     EXPECT_EQ((detail::rest_declaration<RestOfCopy, X>()), Declaration::by_value);
 }
 
-// --- what is said of guards ---
+// --- declarations of guards ---
 
 struct InfoNotConst : TwoFloors {
     GuardInfo guard_info(std::size_t) { return {}; }

@@ -75,7 +75,7 @@ Quadrants spiral()
 TEST(Filippov, ANodeIsReachedAlongASurfaceAndHeld)
 {
     // From (1, 1) both rates are known: y = 0 at 1/1.25 = 0.8 with x = 0.6, then along
-    // y = 0 at -0.5 until x = 0 at 2. There the shares a, b solve 1.5 - 2 a = 0 and
+    // y = 0 at -0.5 until x = 0 at 2. There the weights a, b solve 1.5 - 2 a = 0 and
     // 0.75 - 2 b = 0, and z' = a b = 0.75 * 0.375.
     const Two system(node());
     const auto run = run_from(system, {1.0, 1.0, 0.0}, 3);
@@ -132,7 +132,7 @@ TEST(Filippov, ASpiralOfCrossingsEndsOnTheIntersection)
     EXPECT_EQ(last.mode_after, Two::mode_of(s, s));
     EXPECT_EQ(run.x[0], 0);
     EXPECT_EQ(run.x[1], 0);
-    // By symmetry the shares are 1/2: z' = 1/4 after t = 2. Before, z grows in the first
+    // By symmetry the weights are 1/2: z' = 1/4 after t = 2. Before, z grows in the first
     // quadrant, the time in which is 1 + 1/16 + ... = 16/15.
     EXPECT_NEAR(run.x[2], 16.0 / 15 + 3.0 / 4, 1e-13);
 }
@@ -159,7 +159,7 @@ struct Release {
 
 TEST(Filippov, OneOfTwoSurfacesIsLeftWhereItsShareIsOne)
 {
-    // The share of x is (1 + t) / 2, so that x = 0 is left upward at t = 1 with
+    // The weight of x > 0 is (1 + t) / 2, so that x = 0 is left upward at t = 1 with
     // x = (t - 1)^2 / 2; y = 0 is held with b = (1 + t / 4) / 2 until t = 4.
     const Filippov<Release> system({0.25});
     const auto run = run_from(system, {0.0, 0.0, 0.0}, 5);
@@ -293,7 +293,7 @@ struct Turning {
 
 TEST(Filippov, AFieldThatTurnsAwayDoesNotEndSlidingThatOthersHold)
 {
-    // The share b of y > 0 makes -0.4 - 0.46 a + 0.67 b + 0.44 a b = 0; a stays near 0.4
+    // The weight b of y > 0 satisfies -0.4 - 0.46 a + 0.67 b + 0.44 a b = 0; a stays near 0.4
     // through t = 1, where the field of the third quadrant begins to lead away.
     const Filippov<Turning> system;
     const auto run = run_from(system, {0.0, 0.0}, 1.5);
@@ -305,7 +305,7 @@ TEST(Filippov, AFieldThatTurnsAwayDoesNotEndSlidingThatOthersHold)
     EXPECT_LT(std::max(shares[0], shares[1]), 0.9);
 }
 
-/// x' = 1.1 - a - b and y' = c - a b while sliding, with c rising: the shares that keep
+/// x' = 1.1 - a - b and y' = c - a b while sliding, with c rising: the weights that keep
 /// both still merge with a second solution at c = 1.1^2 / 4 = 0.3025, at t = 1.
 struct Vanishing {
     static constexpr std::size_t surface_count = 2;
@@ -522,7 +522,7 @@ struct Mixed {
     }
 };
 
-/// The same with shares that grow from 0 to 1 over |h| < width.
+/// The same with weights that grow from 0 to 1 over |h| < width.
 template <class Fields>
 struct Steep {
     using State = typename Fields::State;

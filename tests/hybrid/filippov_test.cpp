@@ -468,7 +468,7 @@ struct Circle {
 
 TEST(Filippov, ACurvedSurfaceIsLeftAtAPointKnownInClosedForm)
 {
-    // The rates are push and push - 2, so the share of the outside is push / 2, and the
+    // The rates are push and push - 2, so the weight of the outer field is push / 2, and the
     // angle runs at 1 + push = 3/2 + cos(angle) until the push is 0 at 120 degrees. Its
     // integral there is 2 / sqrt(5/4) atan(sqrt(1/5) tan 60 degrees).
     const double t_exit = 2 / std::sqrt(1.25) * std::atan(std::sqrt(0.2) * std::sqrt(3.0));

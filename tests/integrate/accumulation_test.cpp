@@ -123,7 +123,7 @@ TEST(Accumulation, ImpactsThatAreLocatedLateDoNotFlutter)
 
 TEST(Accumulation, ABallThatDeclaresNothingEndsInsteadOfFalling)
 {
-    // A guard that is not unilateral used to have its repeat suppressed with its reset.
+    // Regression: for a guard that is not unilateral, a repeat was suppressed with its reset.
     for (const double tolerance : {0.0, 1e-9, 1e-6, 1e-3}) {
         const BallOnFloor ball{};
         const auto run = integrate(ball, X{1, 0}, {.t_end = 20, .event_tolerance = tolerance});

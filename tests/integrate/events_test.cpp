@@ -1,5 +1,5 @@
 // The semantics of events: many guards, modes, order, progress, and events that other
-// systems lose.
+// libraries miss.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -128,7 +128,7 @@ Found find_near_tangent(double depth, double phase)
 
 TEST(Events, NearTangentPairsAreFoundDownToTwiceTheTouchBand)
 {
-    // The touch band is 64 units in the last place of the guard's size, 2: 2.8e-14.
+    // The touch tolerance is 64 units in the last place of the guard's size, 2: 2.8e-14.
     // The stepper's own error in the crest is a few 1e-15 after 20 radians.
     std::mt19937 engine(1);
     std::uniform_real_distribution<double> phases(0.5, 5.5);
@@ -187,7 +187,7 @@ TEST(Events, ATouchIsReportedOnceWhereverTheStepsFall)
 
 TEST(Events, ADeclaredBandTurnsDipsOfLessThanItIntoTouches)
 {
-    // Crests of cos(t + 1) that exceed the level by less than the band, or fall short
+    // Crests of cos(t + 1) that exceed the level by less than the tolerance, or fall short
     // of it by less, are one touch each, wherever the steps fall; higher ones are crossed.
     const auto kinds = [](double depth, double touch, double h_max) {
         const ricochet::NearTangent system({.depth = depth, .phase = 1, .touch = touch});
@@ -276,7 +276,7 @@ TEST(Events, ClusteredEventsComeInTheirOrder)
     }
 }
 
-/// u1 = cos 3t, u2 = cos t; both resets are noted in a third and fourth component.
+/// u1 = cos 3t, u2 = cos t; the two resets are counted in a third and fourth component.
 struct Synchronous {
     using State = std::array<double, 6>;
     static constexpr std::size_t guard_count = 2;

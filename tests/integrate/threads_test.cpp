@@ -1,4 +1,4 @@
-// Eight threads share one system and one model: their runs are those of one thread, bit for bit.
+// Eight threads share one system and one model; each run has the bits of the run on one thread.
 // It is built with the thread sanitizer too, which finds errors that equal results may hide.
 #include <gtest/gtest.h>
 

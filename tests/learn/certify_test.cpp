@@ -649,7 +649,7 @@ TEST_F(CertifyFiles, OutOfTimeKeepsAPartialRecord)
     const learn::CertifiedModel all = learn::certify(room_model(), room_problem(), options);
     EXPECT_TRUE(all.proved());
 
-    // With another model or another guard the checkpoint is refused, and so is half of it.
+    // A checkpoint of another model or of another guard is refused, and so is a truncated one.
     const auto refusal = [&](const Model& model, const learn::GuardProblem& problem) {
         return sentence<std::runtime_error>(
             [&] { static_cast<void>(learn::certify(model, problem, options)); });
@@ -689,7 +689,7 @@ TEST_F(CertifyFiles, OutOfMemoryKeepsAPartialRecord)
         asked = 0;
         learn::GuardProblem hungry = room_problem();
         hungry.guard = [&, guard = hungry.guard](const double* x) {
-            // The key of a checkpoint takes the first four.
+            // The first four calls compute the key of the checkpoint.
             if (starved && ++asked > 4 + static_cast<std::uint64_t>(share * (double(all) - 4))) {
                 throw std::bad_alloc();
             }

@@ -153,7 +153,7 @@ TEST(Train, ContradictoryLabelsAreSaidToBeMissed)
     EXPECT_EQ(trained.report.outcome, TrainingOutcome::misses_remain);
     EXPECT_FALSE(trained.misses_none());
     EXPECT_FALSE(trained.model.layers.empty());
-    // It did not resort to announcing an event always.
+    // The classifier does not simply announce an event in every state.
     EXPECT_GE(trained.report.validation.cleared_share, options.cleared_at_least);
 }
 

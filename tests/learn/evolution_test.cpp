@@ -88,7 +88,7 @@ TEST(Evolution, GivesUpWhereEverythingIsRefused)
 TEST(Evolution, IsNotMisledByNoise)
 {
     // Noise of 1 % of the score, from the bits of x. The mean is nearer to the optimum than the
-    // best sample seen, which was selected for its luck.
+    // best sample seen, whose score is low by favourable noise.
     const Objective noisy = [](std::span<const double> x) {
         std::uint64_t hash = 1;
         for (const double value : x) {

@@ -23,7 +23,7 @@ LearnedStep rule_of(const StepLayout& layout, const std::vector<double>& weights
 TEST(WorkCurve, FindsTheWorkAfterWhichTheErrorStaysBelow)
 {
     WorkCurve curve;
-    // The second point is an accident: the third is above it.
+    // The low error of the second point is accidental: the third is above it.
     for (const auto& [work, error] : {std::pair{0.0, 0.0}, {1.0, -4.0}, {2.0, -2.0}, {3.0, -4.0}}) {
         curve.add(work, error);
     }
@@ -88,7 +88,7 @@ TEST(StepScore, OfTheClassicalRuleIsNearZero)
         EXPECT_EQ(part.failed, 0.0);
     }
     EXPECT_EQ(score(plain), score(plain));
-    // Steps four times longer or shorter than requested are no gain.
+    // A constant factor of e^2 or e^-2 on all steps scores worse.
     for (const double value : {-2.0, 2.0}) {
         std::vector<double> weights(step_policy_weights, 0.0);
         weights.back() = value;

@@ -236,7 +236,7 @@ TEST(TrainGate, SaysFirstWhatItsRunsWillCost)
     ASSERT_TRUE(estimate);
     EXPECT_EQ(estimate->events, 300U + 150 + 300 + 2 * 300);
     EXPECT_GE(estimate->seen, 20U);
-    // Of 20 events against 300: the calls an event vary by 2 / sqrt(20) of their mean.
+    // Of 20 events against 300: the calls per event vary by 2 / sqrt(20) of their mean.
     const GateTrial& trial = trained.report.trial;
     const auto each = static_cast<double>(trial.exact_calls) / static_cast<double>(trial.events);
     const auto guessed =
@@ -338,8 +338,8 @@ struct Billiard {
 
 TEST(TrainGate, RoundingThatGrowsIsNotCountedAsMisses)
 {
-    // Checked at every fourth step, which loses only events that graze: none of these. The events
-    // are located from other brackets than those of the exact detector, to other last bits.
+    // A check at every fourth step loses only grazing events, of which there are none. The events
+    // are located from other brackets than with the exact detector, so their last bits differ.
     GateTraining training = quick();
     training.recipe = gate_recipe("state");
     training.step_min = training.step_max = 0.005;

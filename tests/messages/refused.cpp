@@ -1,6 +1,6 @@
 // What is refused at compile time. A line `// CASE n: text` says what the first error of case n
 // contains; 0 compiles. Of a case `alone` no other error has a sentence of the library. `run.sh`
-// looks.
+// checks this.
 
 #include <array>
 #include <cstddef>

@@ -142,10 +142,10 @@ TEST(ContactSolver, RandomProblemsAreSolvedOrReported)
 // stop the approach, p = 2 / (1 - friction) in each, which diverges towards friction 1.
 TEST(ContactSolver, ReboundsThatContradictFrictionALittleAreSolved)
 {
-    // A point in the corner of a floor and a wall, held there by its weight and a push: the wall
-    // asks for a rebound and the floor's friction for rest, and so the other way round. Such
-    // velocities decay from event to event, so each size of them is met; the impulses that they
-    // select differ by as much as friction allows.
+    // A point in the corner of a floor and a wall, held there by its weight and a push. Restitution
+    // at each surface demands a rebound that friction at the other one prevents. Such velocities
+    // decay from event to event, so all magnitudes occur; the impulses that they select differ by
+    // as much as friction allows.
     Eigen::Matrix<double, 4, 2> h;
     h << 0, 1, 1, 0, -1, 0, 0, 1;
     const Eigen::MatrixXd w = h * h.transpose();

@@ -215,7 +215,7 @@ TEST(TimeStepping, AForceThatIsNotFiniteEndsTheRunWithWhatWasComputed)
         TimeStepping<Corner> motion({.e = 0, .broken_from = 0.5}, {1, height}, {0, 0},
                                     {.t_end = 1, .step = 0.01});
         EXPECT_EQ(motion.run(), Outcome::not_converged);
-        // Steps are halved ten times before it.
+        // Steps are halved ten times before the run gives up.
         EXPECT_GT(motion.state().t, 0.48);
         EXPECT_LT(motion.state().t, 0.51);
         EXPECT_TRUE(motion.state().q.allFinite());

@@ -67,7 +67,7 @@ TEST(Composite, AmplifiesAsTheorySays)
                 SetValuedState<Spiral> to = from;
                 ASSERT_TRUE(step.take(from, 1, to).converged);
                 const auto expected = amplification(scheme, {-decay, frequency});
-                // A dozen roundings.
+                // The rounding of a dozen operations.
                 EXPECT_NEAR(to.w[0], expected.real(), 3e-15);
                 EXPECT_NEAR(to.w[1], expected.imag(), 3e-15);
             }
@@ -437,7 +437,8 @@ TEST(Energy, GrowthPerStepWithFrictionIsBoundedAndVanishesWithTheStep)
     const double fine = largest_growth(0.1, FirstStage::averaged);
     RecordProperty("growth_at_the_natural_step", std::to_string(natural));
     RecordProperty("growth_at_a_tenth", std::to_string(fine));
-    // Up to 1.07 was found over many starts; with a tenth of the step none exceeds rounding.
+    // The largest growth found over many starts was 1.07; with a tenth of the step, no growth
+    // exceeds rounding.
     EXPECT_LT(natural, 1.07);
     EXPECT_LT(fine, 1 + 1e-6);
 }
@@ -580,7 +581,7 @@ TEST(MinimalSelection, OpposesMotionBalancesRestAndYieldsAtTheBound)
     EXPECT_EQ(minimal_selection(m, 0, {0, 0})[0], 0);
 }
 
-// --- what is refused, and what is reported ---
+// --- refusals, and reports of failed runs ---
 
 struct Singular : SlidingMode {
     static void mass(One& a) { a << 0; }

@@ -87,7 +87,7 @@ TEST(RandomInclusions, ControllersAndWeakeningFriction)
 
 TEST(RandomInclusions, ARelayTwoIntegrationsAwayIsCrossedAtAnySpeed)
 {
-    // For x2 of 2 and more, a reaction without influence on x1' was mistaken for one that holds it.
+    // Regression: for x2 >= 2, a reaction with no effect on x1' was mistaken for one that holds it.
     auto system = random_inclusion<4>(InclusionFamily::twisting, 0);
     for (const double speed : {1.0, 3.0, 100.0, 1e6}) {
         system.start[0] = -0.1 * speed;

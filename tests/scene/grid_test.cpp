@@ -1,5 +1,5 @@
-// The choice of tests and the order of entries change no bit: cells, rings, the second grid, both
-// calendars; and a gas of unequal discs against brute force.
+// Cells, rings, the second grid and the type of calendar affect the order of the work but no bit of
+// a run; and a gas of unequal discs against brute force.
 #include "scene/grid.hpp"
 
 #include <gtest/gtest.h>
@@ -263,7 +263,7 @@ TEST(Calendars, HaveTheOrderOfASortedSet)
 {
     constexpr std::uint32_t count = 500;
     for (const bool ring : {false, true}) {
-        // Times ahead of every size, some equal, some immediate, some infinite.
+        // Intervals of all magnitudes to the next event, some equal, some zero, some infinite.
         std::mt19937 generator(11);
         std::uniform_real_distribution<double> uniform(0, 1);
         Calendar calendar(count);
@@ -290,7 +290,7 @@ TEST(Calendars, HaveTheOrderOfASortedSet)
                 now = t;
                 set(body);
                 set(static_cast<std::uint32_t>(count * uniform(generator)));
-                // Some return that had no entry.
+                // Bodies without an entry may get one again.
                 if (k % 100 == 0) set(static_cast<std::uint32_t>(count * uniform(generator)));
             }
             for (std::uint32_t i = 0; i < count; ++i) calendar.set(i, no_instant);

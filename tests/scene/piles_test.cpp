@@ -96,7 +96,7 @@ void comes_through(std::uint64_t seed)
     EXPECT_LE(run.statistics.contact_defect, 1e-7) << "seed " << seed;
     double most = energy(pile.scene, run.samples[0]);
     for (std::size_t k = 0; k < run.samples.size(); ++k) {
-        // A step may leave 1e-7 of a velocity of some metres a second for 1e-3 s.
+        // The contact law may leave 1e-7 of velocities of some m/s, which act for a step of 1e-3 s.
         EXPECT_LE(deepest(pile.scene, run.samples[k]), 1e-9) << "seed " << seed << ", row " << k;
         const double now = energy(pile.scene, run.samples[k]);
         // Steps of springs are within a tolerance.
@@ -113,13 +113,13 @@ TEST(Piles, RandomOnesComeThroughWithoutOverlapOrEnergyGained)
 
 TEST(Piles, ADiscMeetsTheChordOfAGroupNotItsVelocity)
 {
-    // A disc on a spring that touched a group used to be moved through it, once for a whole step.
+    // Regression: a disc on a spring that touched a group was moved through it by a whole step.
     for (const std::uint64_t seed : {63, 65, 140}) comes_through(seed);
 }
 
 TEST(Piles, ImpactsCloserThanPlacesTellBecomeLastingContact)
 {
-    // A heavy disc wedges a light one, whose impacts used to be spaced by 1e-14 s forever.
+    // Regression: a heavy disc wedges a light one, which had impacts every 1e-14 s forever.
     comes_through(116);
 }
 

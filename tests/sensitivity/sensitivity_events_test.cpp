@@ -148,7 +148,7 @@ TEST(SensitivityThroughEvents, AGrazingImpactEndsTheDerivativesAndOnlyThem)
     expect_ends_at_second_event(touch);
 }
 
-// t_2 = 2 asin(1 / 4 v0) + asin(wall / v0): large derivatives, but derivatives. The
+// t_2 = 2 asin(1 / 4 v0) + asin(wall / v0): the derivatives are large but exist. The
 // speed of impact is 0.014, which amplifies errors of 1e-12 by its inverse square.
 TEST(SensitivityThroughEvents, AGlancingImpactStillHasDerivatives)
 {

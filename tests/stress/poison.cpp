@@ -380,9 +380,9 @@ Tally poison(const Size& size)
 
 Tally bounds(const Size& size)
 {
-    // A bound that is no bound may cost events, which docs/limits.md says. It never invents any:
-    // up to where the run ends or is named, every event that there is, is a true one; and a bound
-    // that holds costs none.
+    // An invalid bound may lose events, as docs/limits.md states, but never adds any: every event
+    // before the end of the run, or before the guard is reported, is a true one. A valid bound
+    // loses no event.
     Tally tally;
     learn::Random random(size.seed);
     std::uint64_t found_out = 0;

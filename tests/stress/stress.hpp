@@ -1,4 +1,4 @@
-// Stress: properties that must hold whatever is done to a run, in classes with an oracle each.
+// Stress tests: properties that must hold whatever is done to a run, in classes with one oracle.
 //
 // A class counts its cases and reports for each that failed how to repeat it. The short form of
 // all of them takes seconds and is a quick test; the long form is for scripts/stress.

@@ -380,8 +380,8 @@ TEST(Lanes, FourRunsTakeTheirStepsInTurns)
     GTEST_SKIP() << "without optimisation runs are alone";
 #endif
     if (detail::fuses_products()) GTEST_SKIP() << "where products are fused runs are alone";
-    // The guards of four runs are called in turns, those of a fifth one once a lane is free: alone,
-    // the next run would begin where one has ended, in five blocks of calls.
+    // The guards of four runs are called in turns, and those of the fifth run once a lane is free.
+    // Runs one after another would show as five blocks of calls.
     std::vector<const Pendulum*> calls;
     std::vector<Pendulum> systems(5);
     for (auto& system : systems) system.calls = &calls;
@@ -392,7 +392,7 @@ TEST(Lanes, FourRunsTakeTheirStepsInTurns)
     EXPECT_GT(turns, 200U);
 }
 
-/// In registers of two doubles: those of four are those of the runs above, where there are any.
+/// Packs in registers of two doubles. The runs above use registers of four, if there are any.
 TEST(Lanes, RoughPowersHaveTheBitsOfTheirDoubles)
 {
     using Pack = detail::LanePack<false>;

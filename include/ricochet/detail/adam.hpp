@@ -13,7 +13,7 @@
 
 namespace ricochet::learn {
 
-/// m := b1 m + (1 - b1) g,  v := b2 v + (1 - b2) g^2,
+/// The method Adam: m := b1 m + (1 - b1) g,  v := b2 v + (1 - b2) g^2,
 /// p := p - rate m^ / (sqrt(v^) + epsilon),
 /// with m^ = m / (1 - b1^k) and v^ = v / (1 - b2^k) in step k = 1, 2, ...
 class Adam {

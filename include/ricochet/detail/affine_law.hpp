@@ -30,8 +30,8 @@ struct AffineLaw {
     double v_reference = 0;                      ///< the integral of A begins here
 };
 
-/// The pair above by adaptive Gauss-Kronrod quadrature in log(theta), to 1e-13. Made for
-/// checking and exploring: an evaluation takes microseconds.
+/// The pair above, by adaptive Gauss-Kronrod quadrature in log(theta), to 1e-13. Intended for
+/// checks and exploration: an evaluation takes microseconds.
 class AffineLawPotential {
 public:
     static constexpr PotentialKind kind = PotentialKind::quadratic;

@@ -191,7 +191,7 @@ private:
         return false;
     }
 
-    /// Speed |y'| of the y whose zero was an event; infinite if the event was another one.
+    /// Speed |y'| of the y whose zero was the event; infinite if the event was of another kind.
     template <class X>
     [[nodiscard]] double speed_after(const Event<X>& event) const
     {
@@ -227,7 +227,7 @@ private:
         return false;
     }
 
-    /// Whether enough consecutive steps were shorter than necessary that longer ones are tried.
+    /// Whether enough consecutive steps were shorter than necessary for longer ones to be tried.
     [[nodiscard]] bool may_lengthen() noexcept requires can_branch
     {
         if (std::isinf(longest_step_)) return false;
@@ -435,8 +435,8 @@ private:
                              options_.set_valued.step) > 1e-6;
     }
 
-    /// Whether the branches are those of a mode that flows, and no y so near to zero that its
-    /// sign is an accident.
+    /// Whether the branches are those of a mode that flows, and no y is so close to zero that its
+    /// sign is due to rounding.
     [[nodiscard]] bool is_plain(bool switched) requires can_branch
     {
         auto branches = motion_.branches();

@@ -41,8 +41,8 @@ struct InclusionTraits {
     [[nodiscard]] bool of_reactions() const noexcept { return confines == Confines::reaction; }
 };
 
-/// The functions of inclusion.hpp. The functions of a set are those of the set at (t, w). A
-/// function that the system does not have does nothing, or has its default.
+/// Interface with the functions of inclusion.hpp. Those of a set refer to the set at (t, w). A
+/// function that the system lacks does nothing, or returns its default.
 template <int N, int M>
 class RICOCHET_ALIGNED AnyInclusion {
 public:
@@ -444,7 +444,7 @@ private:
 /// Rank of a square matrix to working precision. Writes its inverse if it has one.
 [[nodiscard]] Eigen::Index invert(const Eigen::MatrixXd& a, Eigen::MatrixXd& inverse);
 
-/// An inclusion with its constant matrices at hand, checked.
+/// An inclusion with its constant matrices, which have been checked.
 template <int N, int M>
 class RICOCHET_ALIGNED AnyMatrices {
 public:
@@ -562,7 +562,7 @@ AnyMatrices<N, M>::AnyMatrices(const Any& inclusion) : inclusion_(inclusion)
 
 }  // namespace detail
 
-/// A system with its constant matrices at hand, checked.
+/// A system with its constant matrices, which have been checked.
 template <Inclusion System>
 class InclusionMatrices : public detail::AnyMatrices<state_size<System>, reaction_size<System>> {
 public:

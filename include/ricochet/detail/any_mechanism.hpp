@@ -15,7 +15,7 @@
 
 namespace ricochet::detail {
 
-/// The functions of time_stepping.hpp.
+/// Interface with the functions of time_stepping.hpp.
 template <int N>
 class RICOCHET_ALIGNED AnyMechanism {
 public:

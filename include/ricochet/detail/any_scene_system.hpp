@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// Systems of any type as the scene sees them.
+// Interface through which a scene uses systems of any type.
 #pragma once
 
 #include <cstddef>

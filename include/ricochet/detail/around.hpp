@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// The part of every gate that it delegates to the exact detector inside it.
+// Base of the gates: delegates to the exact detector that a gate wraps.
 #pragma once
 
 #include "ricochet/detail/finding.hpp"

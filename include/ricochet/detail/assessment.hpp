@@ -25,9 +25,9 @@ struct Assessment {
     Confusion confusion;
     double miss_bound = 1;        ///< 95 % upper bound of the fraction of events missed
     double false_alarm_rate = 0;  ///< fraction of all clear states called events
-    double margin = 0.1;          ///< what "well clear" means below
+    double margin = 0.1;          ///< margin from which a state counts as well clear
     std::size_t well_clear = 0;   ///< clear states of at least that margin
-    double cleared_share = 0;     ///< fraction of those called clear; 0 if there are none
+    double cleared_share = 0;     ///< fraction of these that are called clear; 0 if there are none
     double lowest_event = 0;      ///< smallest logit of an event; compare with the threshold
 };
 

@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// The exact rival of a network: where the guard is a parabola in time, whether a
+// An exact alternative to a network: where the guard is a parabola in time, whether a
 // step meets the event surface is one inequality.
 #pragma once
 

@@ -7,7 +7,7 @@
 // certification", NeurIPS 2018, the parallelogram of least area for a ReLU of either sign).
 // Backward, the logit is replaced from the last layer to the first by linear functions below
 // it, with the ranges found forward (Zhang et al., "Efficient neural network robustness
-// certification with general activation functions", NeurIPS 2018). The better one counts.
+// certification with general activation functions", NeurIPS 2018). The tighter bound counts.
 //
 // *Rounding.* The bounds hold for real arithmetic and for the logit as `Classifier` computes
 // it. No rounding mode is changed, so that no compiler can undo it: with u = 2^-53 a sum of n

@@ -297,15 +297,15 @@ private:
         return out;
     }
 
-    /// How far a reaction is above its lower bound and below its upper one; 1 or -1 where
-    /// there is none.
+    /// How far a reaction is above its lower bound and below its upper one; for an infinite bound 1
+    /// if the reaction is inside it, else -1.
     [[nodiscard]] static Slacks slacks(double lower, double upper, double r) noexcept
     {
         return {std::isinf(lower) ? std::copysign(1.0, -lower) : r - lower,
                 std::isinf(upper) ? std::copysign(1.0, upper) : upper - r};
     }
 
-    /// Same as `motion` without the rate: a mode that holds nothing needs only the bounds.
+    /// Same as `motion`, but without the rate in a mode that holds nothing, which needs none.
     [[nodiscard]] Motion bounded_motion(Mode mode, double t, const Vector& w) const
     {
         if (holds(mode)) return motion(mode, t, w);
@@ -421,8 +421,8 @@ private:
         return bend(next, which, up, size, t, w);
     }
 
-    /// The mode when reaction i is at its upper or lower bound and y_i does not move. It leaves if
-    /// the motion curves away from y_i = 0 by more than the rounding of its `terms`.
+    /// The mode when reaction i is at one of its bounds and y_i does not move: y_i leaves zero if
+    /// it bends away by more than the rounding of its `terms`, and is held otherwise.
     [[nodiscard]] Mode bend(Branches next, Eigen::Index i, bool up, double terms, double t,
                             const Vector& w) const
     {

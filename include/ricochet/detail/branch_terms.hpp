@@ -73,8 +73,8 @@ struct RICOCHET_ALIGNED BranchTerms {
     }
 };
 
-/// The first two components of a rate: as many as a function returns in registers. A struct of
-/// two members, which compilers write as a pair, would go through memory.
+/// The first two components of a rate: as many as a function returns in registers. Compilers write
+/// a struct of two members as a pair, which would go through memory.
 __extension__ using FirstRates = __complex__ double;
 
 /// The flow of a mode at (t, x_1, ..., x_N), whose components after the second are written to

@@ -13,7 +13,7 @@
 
 namespace ricochet::learn {
 
-/// How good a set of weights is on the validation set; smaller is better,
+/// Quality of a set of weights on the validation set; smaller is better,
 /// compared from the first member to the last.
 struct Score {
     std::uint64_t misses = 0;        ///< at the threshold chosen for these weights
@@ -23,11 +23,11 @@ struct Score {
     friend bool operator==(const Score&, const Score&) = default;
 };
 
-/// Everything a training needs to continue to the same bits.
+/// Everything that a training needs to continue with the same bits.
 struct Checkpoint {
     std::uint64_t fingerprint = 0;  ///< of the data set and the options
     std::uint64_t iteration = 0;    ///< iterations done
-    double seconds = 0;             ///< spent on them
+    double seconds = 0;             ///< [s] time spent on them
     Random::State random{};
     std::vector<double> parameters;
     Adam::State adam;
@@ -37,13 +37,13 @@ struct Checkpoint {
     Score best_score;
 };
 
-/// Everything the training of a gate needs, whose states are drawn again from its seed.
+/// Everything that the training of a gate needs, whose states are drawn again from its seed.
 struct GateCheckpoint {
     std::uint64_t fingerprint = 0;  ///< of the options and the states of the first round
     std::uint64_t round = 0;
     std::uint64_t iteration = 0;   ///< iterations done in this round
-    std::uint64_t iterations = 0;  ///< in all
-    std::uint64_t since_best = 0;  ///< evaluations
+    std::uint64_t iterations = 0;  ///< iterations of all rounds
+    std::uint64_t since_best = 0;  ///< evaluations since the best one
     double seconds = 0;
     Random::State random{};
     std::vector<double> parameters;

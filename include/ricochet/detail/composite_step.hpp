@@ -42,7 +42,7 @@ enum class Scheme {
 /// Treatment of the reaction in a stage that averages f over its ends.
 enum class FirstStage {
     averaged,  ///< averaged like f: order 2 also where the reaction varies
-    at_end,    ///< that of the stage's end, as in the code of the source: order 1 there
+    at_end,    ///< taken at the stage's end, as in the code of the source: order 1 there
     /// averaged; solved again with at_end where the branch at the stage's end differs from
     /// the one at its start, whose reaction says nothing about the motion after a switch
     switch_aware,
@@ -51,7 +51,7 @@ enum class FirstStage {
 struct SchemeOptions {
     Scheme scheme = Scheme::bathe;
     FirstStage first_stage = FirstStage::averaged;
-    double theta = 0.5;  ///< in [0, 1]; above 0, since the reaction must be implicit
+    double theta = 0.5;  ///< in (0, 1], since the reaction must be implicit
     StageOptions stage{};
 };
 
@@ -69,7 +69,7 @@ template <int N, int M>
     return invert(w, w) < w.rows();
 }
 
-/// Steps from any state to the next. Only factors of constant matrices are carried from one
+/// Steps from any state to the next. Only the factors of constant matrices are kept from one
 /// step to another, so the same state and step give the same bits.
 template <int N, int M>
 class RICOCHET_ALIGNED AnyStep {
@@ -89,7 +89,7 @@ public:
     [[nodiscard]] const Matrices& matrices() const noexcept { return matrices_; }
     [[nodiscard]] const SchemeOptions& options() const noexcept { return options_; }
 
-    /// The state after a step of h from `from`. If it has not converged, `to` is meaningless.
+    /// Takes a step of h from `from`. If it has not converged, `to` is meaningless.
     /// `frozen`: the branches to assume, whether the solution lies on them or not.
     [[nodiscard]] StageReport take(const State& from, double h, State& to,
                                    const Branches* frozen = nullptr);

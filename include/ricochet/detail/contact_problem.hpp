@@ -50,7 +50,7 @@ struct ContactOptions {
 /// with a line search (P. Alart and A. Curnier, A mixed formulation for frictional contact
 /// problems prone to Newton like solution methods, Computer Methods in Applied Mechanics
 /// and Engineering 92, 1991) with rho = 1. Where redundant contacts ask for velocities that
-/// differ a little, impulses have to change by far more than u, and that stalls: then the same
+/// differ a little, impulses have to change by far more than u, and this stalls. Then the same
 /// method solves problems with a softness s, W + s I, by rho = 1 / s, each from the impulses of
 /// the one before (the proximal point method; R. T. Rockafellar, Monotone operators and the
 /// proximal point algorithm, SIAM Journal on Control and Optimization 14, 1976). The last resort
@@ -94,7 +94,7 @@ private:
     Eigen::VectorXd units_;  // 1 / sqrt of the mean diagonal of W in each contact
     Eigen::MatrixXd w_;      // in these units, as are the following
     Eigen::VectorXd q_, p_, u_, f_, direction_, trial_, f_trial_, best_;
-    Eigen::VectorXd diagonal_, free_, start_;  // of the problem, while a softer one is solved
+    Eigen::VectorXd diagonal_, free_, start_;  // of the given problem, while a softer one is solved
     Eigen::MatrixXd v_;
     Eigen::PartialPivLU<Eigen::MatrixXd> lu_;
 };

@@ -35,8 +35,8 @@ struct CubicCheck {
     static constexpr double most = 64;
 
     /// Where one evaluation deviates by so little that the guard stays clear by this factor,
-    /// a second is not needed: a guard that does not follow its cubic crosses it at `inside`
-    /// one time in a thousand.
+    /// a second is not needed: a guard that does not follow its cubic agrees with it this well
+    /// at `inside` one time in a thousand.
     static constexpr double doubt = 1024;
 
     double v0, b1, b2, v1;  ///< control points

@@ -58,8 +58,8 @@ struct Split {
     DataSet held_out;
 };
 
-/// Holds out the fraction `share` of the events and of the clear states, each rounded
-/// to a whole number, drawn at random from `seed`. The order within each part is
+/// Holds out the fraction `share` of the events and the same fraction of the clear states, each
+/// rounded to a whole number, drawn at random from `seed`. The order within each part is
 /// that of `data`.
 /// @throws std::invalid_argument unless 0 <= share <= 1.
 [[nodiscard]] Split split(const DataSet& data, double share, std::uint64_t seed);

@@ -3,8 +3,8 @@
 // Declarations that exist but do not fit.
 //
 // Concepts detect what a system can do, and a member that satisfies none of them would be
-// ignored in silence: a guard that is not const, a reset that returns no mode, a function
-// that counts its guards but takes no number of a guard. Here every such
+// silently ignored: a guard that is not const, a reset that returns no mode, a function
+// of a system with `guard_count` that does not take the number of a guard. Here every such
 // member is examined once per system, templates and overloads too, and is refused with
 // a sentence. So is a member that cannot be called at all, because it is private or its own
 // requires-clause does not hold, and one whose name is a slip away from a known one. A
@@ -296,7 +296,7 @@ template <class System, class X>
     }
 }
 
-/// A declaration that is refused. What needs it then fails to fit, and is not reported for that.
+/// A declaration that is refused. Functions that need it do not fit then, and are not reported.
 template <class Name, class System, class X>
 [[nodiscard]] constexpr bool is_refused(Declaration found) noexcept
 {

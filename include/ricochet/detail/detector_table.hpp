@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// A detector and a locator as the loop sees them: values with functions.
+// A detector and a locator as tables of functions, for the loop.
 #pragma once
 
 #include <cstddef>
@@ -71,7 +71,7 @@ struct LocatorTable {
     Location (*locate)(const void* self, GuardPath& path, double lo, double lo_value,
                        double lo_rate, double hi, double hi_value, double hi_rate,
                        double tolerance) = nullptr;
-    /// Where the series of the guard gives a root, the locator is not called.
+    /// Whether the locator is not called where the series of the guard gives a root.
     bool yields_to_series = false;
 };
 

@@ -21,8 +21,8 @@ namespace detail {
 
 class Recorded;  // the scalar of Taylor's method (detail/taylor_recording.hpp)
 
-/// Derivatives of a system's functions by one parameter; where there is none, differences are
-/// taken.
+/// Derivatives of a system's functions by one parameter. Where a function is empty, differences
+/// are taken.
 struct ParameterDerivatives {
     std::function<void(Mode, double t, std::span<const double> x, std::span<double> df)> flow{};
     /// The same for power series of n components.
@@ -43,7 +43,7 @@ struct ParameterDerivatives {
 template <class System>
 struct Parameter {
     std::function<System(double)> with{};                       ///< the system with that value
-    double nominal = std::numeric_limits<double>::quiet_NaN();  ///< its value in the system at hand
+    double nominal = std::numeric_limits<double>::quiet_NaN();  ///< value in the system that is run
     double scale = 0;  ///< over which the system becomes nonlinear; 0: |nominal|, or 1 if that is 0
     std::vector<double> start{};           ///< derivative of the initial state by it; empty: zero
     detail::ParameterDerivatives exact{};  ///< set by `parameter(make, nominal)`

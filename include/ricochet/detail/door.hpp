@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// Converts a user's system, whatever its spellings and its type of state, to the table that the
+// Converts a user's system, in whatever form and with whatever type of state, to the table that the
 // loop uses (detail/system_table.hpp).
 #pragma once
 

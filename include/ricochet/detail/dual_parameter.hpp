@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Derivatives of a system's functions by a parameter, by dual numbers.
 #pragma once
@@ -19,7 +19,7 @@
 
 namespace ricochet::detail {
 
-/// The components, as a state of the scalar S that does not move with the parameter.
+/// The components, as a state of the scalar S that does not depend on the parameter.
 template <class X, class S, class Component>
 [[nodiscard]] WithScalar<X, S> still_state(const Component* x, std::size_t n)
 {
@@ -45,7 +45,7 @@ concept GuardAt = requires(const System& system, const T& t, const Xs& x)
     requires GuardReturns<System, T, Xs, T>;
 };
 
-/// The reset of all that fired, with a scalar T. False: the system has none with that scalar.
+/// Applies the reset of all guards that fired, with a scalar T. False: there is none for T.
 template <class System, class T, class Xs>
 [[nodiscard]] bool reset_of_scalar([[maybe_unused]] const System& system,
                                    [[maybe_unused]] const FiredGuards& fired,
@@ -149,9 +149,9 @@ namespace ricochet {
 ///
 ///     parameter<Swing<double>>([](auto length) { return Swing<decltype(length)>{length}; }, 1.0)
 ///
-/// By `Taylor` the flow's derivative is a power series if `ricochet/taylor.hpp` is included. What
-/// is no such template, resets of several guards without a common one, `rest`, and time events that
-/// move with the parameter have differences.
+/// With `Taylor` the derivative of the flow is a power series if `ricochet/taylor.hpp` is included.
+/// Differences are taken of functions that are no such templates, of resets of several guards
+/// without a common one, of `rest`, and of time events that move with the parameter.
 ///
 /// @tparam System  the system that is run, made with a number
 /// @param make     the system with a parameter of any scalar

@@ -15,15 +15,15 @@
 
 namespace ricochet::detail {
 
-/// Options of the event-driven phase that begins at t, after so many samples and steps.
+/// Options of the event-driven phase that begins at t, after `samples` samples and `steps` steps.
 [[nodiscard]] Options event_options(const HandOverOptions& options, double t, std::size_t samples,
                                     std::uint64_t steps);
 
-/// Converts the outcome of an event-driven phase to the cause of a set-valued one; nothing if
+/// Cause of the set-valued phase after an event-driven one with this outcome; nothing if
 /// the run is over.
 [[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;
 
-/// A simulation with N components, whatever its system and stepper.
+/// A simulation with N components, for systems and steppers of any type.
 template <int N>
 class EventLoop {
 public:
@@ -76,7 +76,7 @@ private:
     Simulation<System, X, Stepping> simulation_;
 };
 
-/// Makes loops of one stepper.
+/// Factory of loops with one stepper.
 template <int N, int M>
 struct EventStepping {
     std::unique_ptr<EventLoop<N>> (*make)(const AnyModes<N, M>& modes,

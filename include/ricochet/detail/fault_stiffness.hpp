@@ -27,7 +27,7 @@ struct Spectrum {
     double upper = 0;
 };
 
-/// A value; copies share their entries, which never change.
+/// A stiffness matrix. A value: copies share their entries, which never change.
 class FaultStiffness {
 public:
     /// Entries by distance in elements, along x and along depth.

@@ -40,7 +40,7 @@ public:
         return 1u << (2 * surface + (side == Place::above ? 1 : 0));
     }
 
-    /// Places of a motion that starts on the surfaces in `on`, without a history.
+    /// Places of a motion that starts on the surfaces in `on` without a history.
     template <class X>
     [[nodiscard]] Places decide(const Places& at, Surfaces on, double t, const X& x) const
     {
@@ -48,7 +48,7 @@ public:
         return on == both ? decide_on_both({}, t, x) : decide_on_one(at, on, 0, t, x);
     }
 
-    /// The rates below and above in units of the larger.
+    /// The rates below and above as fractions of the larger.
     [[nodiscard]] static std::array<double, 2> scaled(const std::array<double, 2>& rates) noexcept
     {
         const double size = largest_component(rates);

@@ -186,8 +186,8 @@ public:
         }
     }
 
-    /// The same, and 0 where it is no more than the rounding of its terms, which are the rates
-    /// for single components of v. Only a rate that is small by any measure is worth this check.
+    /// Same as `surface_rate`, but 0 where that is within the rounding of its terms, the rates for
+    /// single components of v. Only a rate that is small by any measure is worth this check.
     template <class X>
     [[nodiscard]] double resolved_rate(std::size_t which, double t, const X& x, const X& v) const
     {
@@ -358,8 +358,8 @@ private:
         fields_.field(region_of(put(at, which, Place::above)), t, x, f[0]);
         const double rate_below = surface_rate(which, t, x, dxdt);
         const double normal = surface_rate(which, t, x, f[0]) - rate_below;
-        // A share of 0 to 1 keeps the excess within the jump. This clamp alone does so beyond the
-        // exit of a step that will be cut there, and where both fields become tangent.
+        // A share in [0, 1] keeps the excess within the jump. Beyond the exit, in a step that will
+        // be cut there, and where both fields become tangent, only this clamp does.
         const double most = 2 * std::fabs(normal);
         const double excess = std::clamp(rate_below + restoring(which, t, x), -most, most);
         for_each_component(x, [&](auto i) {

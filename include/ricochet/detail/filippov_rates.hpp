@@ -63,7 +63,7 @@ struct Shares {
     }
 };
 
-/// The shares of a motion: 0 or 1 beside a surface, 1/2 along it.
+/// The shares of a motion: 0 or 1 beside a surface, 1/2 on it.
 [[nodiscard]] constexpr Shares middle_of(const Places& at) noexcept
 {
     const auto share = [](Place place) {

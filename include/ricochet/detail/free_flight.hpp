@@ -124,9 +124,9 @@ private:
 
 }  // namespace detail
 
-/// State x = (q, v). An impact allocates memory; flight does not. The impact of one contact
-/// without friction, or with one tangent, is computed in closed form: at restitution 1 it keeps
-/// the energy to rounding.
+/// A mechanical system in flight, with the state x = (q, v). An impact allocates memory; flight
+/// does not. The impact of one contact without friction, or with one tangent, is computed in closed
+/// form: at restitution 1 it keeps the energy to rounding.
 template <class System>
 class FreeFlight : public detail::AnyFlight<System::coordinates> {
 public:

@@ -26,7 +26,7 @@ namespace ricochet {
 ///             pulled-left, while sticking: static_friction - stiffness u; falling
 ///             pulled-right, while sticking: static_friction + stiffness u; falling
 ///     reset   stop: v⁺ = b; on to stick where the static friction holds the spring,
-/// else to slip in the direction of the spring's pull
+///             else to slip in the direction of the spring's pull
 ///             pulled-*: u⁺ = +-static_friction / stiffness, v⁺ = b; on to slip-*
 ///
 /// The stages of a step may lie beyond s = 0: there R is continued smoothly until it has

@@ -259,7 +259,7 @@ template <class Elimination>
         const double step = search.step(gap, slope, v, v_star);
         // A root at which the residual falls is a saddle of the potential, and is skipped.
         const bool flat = (slope > 0 && std::abs(gap) <= 4e-16 * size) || search.closed();
-        // After a Newton step this small the error is its square; it is added to first order.
+        // A Newton step this small leaves an error of its square, so it is added to first order.
         if (flat || (search.newton() && std::abs(step) <= 3e-8)) {
             const double last = flat ? 0 : step;
             out.v = v * (1 + last * (1 + last / 2));

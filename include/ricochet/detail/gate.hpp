@@ -53,7 +53,7 @@ void check_gate_model(const Model& model, const System& system)
 
 namespace gates {
 
-/// Immutable, shared by threads and copies; evaluating it allocates nothing.
+/// A trained gate. Immutable, shared by threads and copies; evaluating it allocates nothing.
 class Gate {
 public:
     /// @throws std::invalid_argument if the model is no gate, its levels do not fit its outputs or
@@ -76,7 +76,7 @@ public:
     /// Answer of the gate about a state.
     struct Answer {
         double cleared = 0;
-        bool outside = false;  ///< of the domain; nothing is cleared
+        bool outside = false;  ///< outside the domain, where nothing is cleared
     };
 
     template <class System, class X>

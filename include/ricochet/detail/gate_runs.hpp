@@ -107,8 +107,8 @@ public:
                                .estimate = estimate});
     }
 
-    /// States of runs with so many events in all. Of the states without an event within reach, a
-    /// fraction is kept that gives about `states` in all, each with its weight.
+    /// Samples states from runs with `events` events in total. Of the states without an event in
+    /// reach, a fraction is kept that gives about `states` in total, each with its weight.
     [[nodiscard]] GateSamples sample(std::size_t events, std::size_t states, std::uint64_t seed)
     {
         Random random(seed);
@@ -139,7 +139,7 @@ public:
         return out;
     }
 
-    /// New states on which the gate is wrong or nearly so, and states near them.
+    /// Samples new states on which the gate is wrong or nearly so, and states near them.
     [[nodiscard]] GateSamples hard(const gates::Gate& gate, std::size_t events, std::uint64_t seed)
     {
         const GateSamples fresh = sample(events, training_.states / 4, seed);
@@ -163,7 +163,7 @@ public:
         return out;
     }
 
-    /// Compares the declared bounds with the guard along runs of so many steps in all.
+    /// Compares the declared bounds with the guard along runs of `steps` steps in total.
     /// @throws std::invalid_argument naming a bound that is broken.
     void check_bounds(std::size_t steps, std::uint64_t seed)
     {
@@ -221,7 +221,7 @@ public:
         return trial;
     }
 
-    /// Finds so many events with every rival way of detection, the detector last.
+    /// Finds `events` events with every other method of detection, and with the detector last.
     template <class Detector>
     [[nodiscard]] std::vector<Rival> rivals(const Detector& detector, std::size_t events,
                                             std::uint64_t seed)
@@ -302,7 +302,7 @@ private:
         return training_.kind == GateKind::horizon ? training_.levels.back() : 0;
     }
 
-    /// Goes through a run and keeps its states.
+    /// Advances a run to its end and keeps its states.
     void follow(Exact& run, GateSamples& out, double share, Random& random)
     {
         out.width = width_;
@@ -375,8 +375,8 @@ private:
         out.append({state.features.data(), width_}, event, back, state.value, fatal ? 1 : 1 / kept);
     }
 
-    /// The time [s] at which a guard that has had its event is seen on its side again, at the end
-    /// of a step, if the flow continues without the reset. Infinite: not within the longest
+    /// Time [s] at which a guard is first seen on its side again after its event, at the end of
+    /// a step, if the flow continues without the reset. Infinite: not within the longest
     /// horizon.
     template <class E>
     [[nodiscard]] double time_of_return(const E& event)
@@ -460,7 +460,7 @@ private:
         none,
     };
 
-    /// Advances both to their next event, after `seen` of them in earlier runs.
+    /// Advances both runs to their next event; earlier runs have had `seen` events.
     template <class Gated>
     [[nodiscard]] Agreement take_next_event(Exact& exact, Gated& gated, std::uint64_t seen)
     {
@@ -499,7 +499,7 @@ private:
         trial.repeated += b.repeated_steps;
     }
 
-    /// After a miss both continue from the exact run's state. False: they cannot.
+    /// Continues both runs from the exact run's state after a miss. False: they cannot continue.
     template <class Gated, class Detector>
     [[nodiscard]] bool restart(std::optional<Exact>& exact, std::optional<Gated>& gated, const X& x,
                                const Options& options, const Detector& detector) const

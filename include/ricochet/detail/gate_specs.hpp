@@ -20,8 +20,8 @@
 
 namespace ricochet::learn {
 
-/// Any of the systems with such a gate, with vectors as states, so that runs are compiled once
-/// for all of them.
+/// A system for which the library has a gate, with vectors as states, so that runs are compiled
+/// once for all of them.
 class GateSystem {
 public:
     using State = std::vector<double>;

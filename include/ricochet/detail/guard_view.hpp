@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// One guard of a system as detectors and locators use it: evaluations are counted,
+// View of one guard of a system for detectors and locators: evaluations are counted,
 // and the rate is available whether or not the system has one in closed form.
 #pragma once
 
@@ -165,7 +165,7 @@ public:
         return rate;
     }
 
-    /// As `rate`, but a closed form that is not finite is not replaced.
+    /// Same as `rate`, but a closed form that is not finite is not replaced.
     template <class V, class D>
     [[nodiscard, gnu::always_inline]] double raw_rate(double t, const V& x, const D& dxdt,
                                                       double scale) const

@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // Options and results of a hand-over: phases of events and of set-valued steps.
 #pragma once
@@ -54,8 +54,8 @@ struct HandOverOptions {
     /// The run ends, as `not_handed_over`, when a set-valued phase would begin.
     bool events_only = false;
 
-    /// The run ends, as `released`, when every reaction is at a bound and no y is so near to zero
-    /// that its sign is an accident.
+    /// The run ends, as `released`, when every reaction is at a bound and no y is so close to zero
+    /// that its sign is due to rounding.
     bool until_released = false;
 
     /// Options of the set-valued phases; their times are those of the run. A step of zero is a
@@ -84,7 +84,7 @@ struct RICOCHET_ALIGNED AnyHandOverRun {
 
     Outcome outcome = Outcome::reached_end;
     StateWithReaction<N, M> state;  ///< at the time reached, with its reaction
-    Mode mode = 0;                  ///< in a set-valued phase `BranchModes::several`
+    Mode mode = 0;                  ///< `BranchModes::several` in a set-valued phase
     std::vector<Event<Vector>> events;
     std::vector<Phase> phases;
     Trajectory<Vector> trajectory;  ///< at the sample times

@@ -1,19 +1,19 @@
 // Internal: the declarations of this header may change without notice.
 //
-// Detects when following events no longer pays.
+// Detects when locating events no longer pays.
 #pragma once
 
 #include <cstdint>
 
 namespace ricochet::detail {
 
-/// Whether events come so close upon one another that locating them does not pay: more than
-/// 200 within `span` [s].
+/// Whether events follow each other so closely that locating them does not pay: 200 of them
+/// within `span` [s].
 class ChatterWatch {
 public:
     ChatterWatch(double t, double span) noexcept : marked_(t), span_(span) {}
 
-    /// Called at time t, after so many events of the phase.
+    /// Called at time t, after `events` events of the phase.
     [[nodiscard]] bool operator()(double t, std::uint64_t events) noexcept
     {
         if (events < mark_ + most_events) return false;
@@ -31,11 +31,11 @@ private:
 };
 
 /// Whether a y that switches stays within the error of the steps: more than 400 events in a row
-/// between which it goes no farther from zero. Their times are then accidents of rounding, and
+/// between which it goes no farther from zero. Their times are then determined by rounding, and
 /// unlike the events of an accumulation they need not become denser.
 class FlutterWatch {
 public:
-    /// Called after so many events, the last of them at t; `speed()` is then the speed of the y
+    /// Called after `events` events, the last of them at t; `speed()` is then the speed of the y
     /// concerned, and `resolved` the part of it that a step resolves.
     template <class Speed>
     [[nodiscard]] bool operator()(std::uint64_t events, double t, double resolved,

@@ -9,10 +9,10 @@
 
 namespace ricochet::detail {
 
-/// Arrays have as many elements as the state. Rates are with respect to the offset s in [0, h].
-///
-/// Time and remainder are not adjacent: a compiler would copy both together, right after they were
-/// written one by one, and the processor would stall.
+/// Table of a step's data and functions. Arrays have as many elements as the state.
+/// Rates are with respect to the offset s in [0, h].
+/// Time and remainder are not adjacent: a compiler would copy both together, right after they
+/// were written one by one, and the processor would stall.
 struct HostStepTable {
     double t = 0;  ///< [s] at the start
     double h = 0;  ///< [s]

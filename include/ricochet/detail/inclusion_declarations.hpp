@@ -41,7 +41,7 @@ concept InclusionSpeltWell = requires
 #undef RICOCHET_VALUE
 };
 
-/// Refuses each with a sentence; data members and types may have a name near to a function's.
+/// Refuses each of these with a sentence. Data members and types may have such a name.
 template <class System>
 struct NearInclusionNamesOf {
 #define RICOCHET_FUNCTION(wrong, right)                                                              \
@@ -149,7 +149,7 @@ constexpr bool check_inclusion()
     return true;
 }
 
-/// States what a system lacks that is no inclusion.
+/// Reports what a system lacks to be an inclusion.
 template <class System>
 constexpr void refuse_no_inclusion()
 {

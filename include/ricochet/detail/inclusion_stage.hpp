@@ -124,7 +124,7 @@ struct RICOCHET_ALIGNED StageScratch {
     State f, f_trial, w0, trial, defect, base;
     Reaction s, y, reaction, argument, image, rho, lower, upper;
     LinearInequality<M> inequality;
-    // Steps of constant length have two stages, and halved steps as many again.
+    // Steps of constant length need the factors of two stages, and halved steps two more.
     std::array<StageFactor<N, M>, 4> factors;
     std::size_t next_factor = 0;
 

@@ -102,7 +102,7 @@ class KernelOf {
     }
 
 public:
-    /// Runs quietly where the state is small, and the system has one guard or none.
+    /// The quiet runs of a small state in a system with one guard or none, else null.
     /// @tparam Screen  `Ends` or `Extremum`; void without a guard
     template <bool controlled, class Screen>
     [[nodiscard]] static constexpr QuietKernel<C> quiet() noexcept

@@ -3,8 +3,8 @@
 // Four doubles side by side, one for each of four motions, with the operations of one double.
 //
 // Every lane has the bits of the same operation on a double: sums, products and quotients are the
-// processor's, and other functions are those of the standard library, called for each lane. A
-// function that is compiled for another machine than its file has them inlined.
+// processor's, and other functions are those of the standard library, called for each lane. In a
+// function that is compiled for another machine than its file they are inlined.
 #pragma once
 
 #include <cmath>

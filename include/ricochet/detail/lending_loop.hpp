@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// A loop whose quiet steps are taken elsewhere, together with those of other runs.
+// A loop whose quiet steps are taken elsewhere, together with the quiet steps of other runs.
 #pragma once
 
 #include <memory>

@@ -17,7 +17,7 @@ struct LevenbergMarquardtOptions {
     int iterations = 100;
     double seconds = 1e9;           ///< of processor time of this process
     double target = 0;              ///< stop at this sum of squares
-    double step_tolerance = 1e-14;  ///< stop when no parameter moves by more, relatively
+    double step_tolerance = 1e-14;  ///< stop when no parameter moves by more, relative to its size
     double damping = 1e-2;          ///< at the start, relative to the diagonal of J^T J
     const std::atomic<bool>* cancelled = nullptr;  ///< true ends it after the sum in progress
 };

@@ -53,8 +53,8 @@ struct RICOCHET_ALIGNED LinearInequality {
         return -1;
     }
 
-    /// The solution on the first branches that fit, `branches` being tried before any others;
-    /// these are overwritten. False if none was found.
+    /// Finds the solution on the first branches that fit. `branches` are tried before any others,
+    /// and are overwritten. False if none was found.
     [[nodiscard]] bool solve(Vector& reaction, Vector& y, Branches& branches) const
     {
         if constexpr (M == 1) {

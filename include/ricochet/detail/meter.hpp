@@ -137,7 +137,7 @@ public:
     [[nodiscard]] MeterReading reading() const noexcept;
 
 private:
-    static constexpr std::uint64_t every = 32;  ///< one in so many is timed, later one in 512
+    static constexpr std::uint64_t every = 32;  ///< one call in so many is timed, later one in 512
 
     enum Way : std::uint8_t { check, plan, ask };
     static constexpr std::array<Way, 3> all_ways{check, plan, ask};
@@ -196,7 +196,7 @@ private:
     bool decides_;
     bool samples_;
     Way best_;
-    Way way_;  ///< a trial if it is not the best one
+    Way way_;  ///< alternative in use; a trial if it is not the best one
     SampledCost guard_, network_;
     SampledCost checked_step_, planned_step_;  ///< without checks and inferences
     std::array<Account, 3> accounts_;

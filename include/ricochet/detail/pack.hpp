@@ -18,7 +18,7 @@ void check_layers(const Model& model, std::string_view who);
 
 namespace RICOCHET_KERNEL_NAMESPACE {
 
-/// Values that `pack` writes.
+/// Number of values that `pack` writes.
 template <class T>
 [[nodiscard]] std::size_t packed_size(const Model& model) noexcept
 {

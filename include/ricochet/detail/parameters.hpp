@@ -11,8 +11,8 @@
 
 namespace ricochet {
 
-/// The defaults are those of S. Liu, K. Bhattacharya and N. Lapusta, Learning a potential
-/// formulation for rate-and-state friction, arXiv 2507.09796, 2025, eq. 12.
+/// Parameters of friction. The defaults are those of S. Liu, K. Bhattacharya and N. Lapusta,
+/// Learning a potential formulation for rate-and-state friction, arXiv 2507.09796, 2025, eq. 12.
 struct RateStateParameters {
     double a = 0.011;        ///< direct effect, positive
     double b = 0.016;        ///< effect of the state, positive; rate-weakening for b > a

@@ -2,9 +2,9 @@
 //
 // Quiet runs: consecutive steps without events.
 //
-// For a small state with at most one guard the loop enters a function specific to the system, with
-// flow and guard inlined, or one of the library that calls them by pointer, which continues until
-// a step needs a check, or the end is near. Bits and counts are those of the loop.
+// For a small state with at most one guard the loop calls a function specific to the system, with
+// flow and guard inlined, or a function of the library that calls them by pointer. It continues
+// until a step needs a check, or the end is near. Bits and counts are those of the loop.
 #pragma once
 
 #include <atomic>

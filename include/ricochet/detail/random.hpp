@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// Random numbers that are the same everywhere.
+// Random numbers that are the same on every machine.
 //
 // The distributions of <random> differ between standard libraries; a training
 // that must be repeatable to the bit needs its own. The generator is

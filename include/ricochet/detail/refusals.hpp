@@ -12,7 +12,7 @@ namespace ricochet::detail {
 [[noreturn]] void throw_start_empty(std::string_view who);
 /// @throws std::invalid_argument: the start is not finite.
 [[noreturn]] void throw_start_not_finite(std::string_view who, std::size_t component, double value);
-/// @throws std::invalid_argument: the number of absolute tolerances is not that of components.
+/// @throws std::invalid_argument: the numbers of absolute tolerances and of components differ.
 [[noreturn]] void throw_wrong_tolerances(std::size_t components, std::size_t tolerances);
 /// @throws std::invalid_argument: the start is behind a unilateral guard.
 [[noreturn]] void throw_start_outside_mode(std::string_view who, std::size_t which,
@@ -22,7 +22,7 @@ namespace ricochet::detail {
 /// @throws std::invalid_argument: a unilateral guard that does not fall.
 [[noreturn]] void throw_unilateral_not_falling(std::string_view who, std::size_t which,
                                                std::string_view name);
-/// @throws std::invalid_argument: a tolerance of touches that is none.
+/// @throws std::invalid_argument: an invalid tolerance of touches.
 [[noreturn]] void throw_bad_touch(std::string_view who, std::size_t which, std::string_view name,
                                   double touch);
 /// @throws std::invalid_argument: a guard is not finite at the start.
@@ -30,7 +30,7 @@ namespace ricochet::detail {
                                                std::string_view name, double t, double guard);
 /// @throws std::invalid_argument: the flow gives its rate another dimension at the start.
 [[noreturn]] void throw_flow_does_not_fit(std::string_view who, std::size_t components);
-/// @throws std::invalid_argument: the start mode is none of the system's.
+/// @throws std::invalid_argument: the system does not have the start mode.
 [[noreturn]] void throw_unknown_mode(std::string_view who, std::size_t mode, std::size_t modes);
 /// @throws std::invalid_argument: error control by a method without an estimate.
 [[noreturn]] void throw_no_error_estimate();

@@ -1,7 +1,7 @@
 // Internal: the declarations of this header may change without notice.
 //
-// Mistaken calls of `integrate`, each refused with a sentence where the compiler would list the
-// candidates that it has tried.
+// Overloads that refuse mistaken calls of `integrate`, each with a sentence in place of the
+// compiler's list of candidates.
 //
 // These overloads are never called. They accept arguments written in braces, which have no
 // type, and are worse matches than the right ones wherever those fit.

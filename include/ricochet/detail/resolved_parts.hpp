@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// A step divided until a cubic through the ends of each part describes the guard.
+// Division of a step into parts on each of which the cubic through its ends describes the guard.
 #pragma once
 
 #include <algorithm>

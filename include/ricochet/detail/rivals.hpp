@@ -33,7 +33,7 @@ struct RunCost {
                                               std::uint64_t most) const noexcept;
 };
 
-/// The cost of the runs that `start` produces, measured over 20 events or a fifth of a second; at
+/// Cost of the runs that `start` produces, measured over 20 events or a fifth of a second; at
 /// most 100 000 steps and two seconds where there is no event.
 template <class Start>
 [[nodiscard]] RunCost cost_of_runs(const Start& start)
@@ -56,7 +56,7 @@ template <class Start>
     return cost;
 }
 
-/// The same runs with every method that is available.
+/// Repeats runs of a system with every available method, for comparison.
 template <class System, class X, class Stepping, class Network>
 class RivalRuns {
 public:

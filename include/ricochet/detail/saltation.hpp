@@ -147,7 +147,7 @@ public:
         return time;
     }
 
-    /// Takes the motion through a reset at an event that moves by dt; `held` if the motion
+    /// Takes the motion through a reset at an event that moves by dt; `held`: the motion
     /// stands still from there on.
     template <class Reset>
     void pass(const Reset& reset, const Eigen::VectorXd& dt, Motion<X>& motion,
@@ -430,7 +430,7 @@ private:
                 last.flight_start = way.t;
             }
         }
-        // Events that move differently are no common cause for the next event at this time.
+        // Events that move differently do not count as a cause of the next event at this time.
         last.any = together;
         last.t = way.t;
         last.dt = dt;

@@ -40,7 +40,7 @@ struct NewtonReport {
     int iterations = 0;
 };
 
-/// Memory of the method, to be kept where nothing may be allocated.
+/// Memory of the method, to be kept by callers that must not allocate.
 template <class Vector>
 struct NewtonScratch {
     Vector f, direction, trial, f_trial;

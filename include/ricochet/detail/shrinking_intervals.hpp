@@ -22,7 +22,7 @@ namespace ricochet::detail {
 class ShrinkingIntervals {
 public:
     /// Records an event at `t`, where a step would be of length `step` [s]; true
-    /// after a hundred in a row that the time does not distinguish.
+    /// after more than a hundred in a row that the time does not distinguish.
     [[nodiscard]] bool stalls(const Instant& t, double step) noexcept
     {
         step_ = step;
@@ -87,8 +87,8 @@ public:
         return sunk_ >= 3 || (sunk && shrinking_ >= 3);
     }
 
-    /// Records how far a reset put the guard back from its surface, towards which it goes on
-    /// moving; true where such jumps have fallen for three events, to a thousandth, and are now
+    /// Records how far a reset put the guard back from its surface, while the guard still moves
+    /// towards it; true if such jumps have fallen for three events, to a thousandth, and are now
     /// lost in the guard's `rounding`: the next crossing exists, but is no longer seen.
     [[nodiscard]] bool jump_is_lost(double away, double rounding) noexcept
     {
@@ -179,8 +179,8 @@ public:
     }
 
 private:
-    /// A parabola that leaves at `rate`, for an interval that shrinks as the last one did,
-    /// rises by rate * interval / 4.
+    /// Height of the next excursion: a parabola that leaves at `rate`, for an interval that
+    /// shrinks as the last one did, rises by rate * interval / 4.
     [[nodiscard]] double rise(double rate) const noexcept
     {
         return std::fabs(rate) * interval_ * ratio_ / 4;
@@ -212,7 +212,7 @@ private:
     std::uint32_t sunk_ = 0;
     bool low_ = false;
     double jump_ = 0;          ///< how far the last reset put the guard back
-    double highest_jump_ = 0;  ///< the first of those that have fallen since
+    double highest_jump_ = 0;  ///< the first jump of the falling sequence
     std::uint32_t falls_ = 0;
 };
 

@@ -1,7 +1,7 @@
 // Internal: the declarations of this header may change without notice.
 //
-// Random numbers for scenes and seeds, the same everywhere: splitmix64 (Steele, Lea and Flood,
-// 2014).
+// Random numbers for scenes and seeds that are the same on every machine: splitmix64 (Steele, Lea
+// and Flood, 2014).
 #pragma once
 
 #include <cstdint>

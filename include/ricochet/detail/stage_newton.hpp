@@ -53,7 +53,7 @@ public:
                            std::numeric_limits<double>::min()});
         x_.head(w.size()) = w;
         x_.tail(reaction.size()) = reaction;
-        // Slightly below, since this scale is that of the start.
+        // Below the tolerance, since the scale here is that of the starting point.
         const NewtonReport newton = semismooth_newton(*this, x_,
                                                       {.tolerance = options.tolerance / 4,
                                                        .max_iterations = options.max_iterations,

@@ -34,14 +34,14 @@ enum class StepReward {
     /// all cost the same w = 1. E is the scaled error of the step.
     published,
     /// -work / work_unit - lambda (integral over the step of |y - y_ref|^2) / (integral of
-    /// |y_ref|^2 over the run): the sum over an episode is minus the cost and the error of the run.
+    /// |y_ref|^2 over the run). The rewards of an episode add up to minus its cost and error.
     additive,
 };
 
 /// Map from an action in [-1, 1] to a step in [h_min, h_max].
 enum class StepScale {
     linear,       ///< as in the source's code
-    logarithmic,  ///< equal factors
+    logarithmic,  ///< equal ratios
 };
 
 struct StepEnvironmentOptions {
@@ -52,12 +52,12 @@ struct StepEnvironmentOptions {
     double work_unit = 10;  ///< iterations of a fault, solves of other systems; positive
     StepScale scale = StepScale::logarithmic;
     double h_min = 1e-5;  ///< [s] positive
-    double h_max = 0;     ///< [s] above h_min; 0: that of the source
-    /// `doubling` is that of the source, with its norm and its atol = tolerance / 1000; it costs
+    double h_max = 0;     ///< [s] above h_min; 0: the source's
+    /// `doubling` is the source's estimate, with its norm and its atol = tolerance / 1000; it costs
     /// six solves instead of two.
     ErrorEstimate estimate = ErrorEstimate::embedded;
-    FirstStage first_stage = FirstStage::averaged;  ///< at_end: that of the source
-    double tolerance = 1e-3;                        ///< to which E is scaled, positive
+    FirstStage first_stage = FirstStage::averaged;  ///< at_end: the source's
+    double tolerance = 1e-3;                        ///< tolerance to which E is scaled, positive
     /// A fault's episode ends when nothing moves any more, nor ever will. The source continues.
     bool until_rest = false;
     std::uint64_t max_attempts = 20'000;  ///< then an episode is cut
@@ -65,7 +65,7 @@ struct StepEnvironmentOptions {
     StepWatch watch{};
 };
 
-/// The options of the source.
+/// The options with which the source trains.
 [[nodiscard]] StepEnvironmentOptions published_step_environment(double alpha = 2);
 
 /// Number of consecutive unsolvable steps after which an episode ends.

@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// The data that a system provides to a rule that chooses steps.
+// Description of the data that a system provides to a rule that chooses steps.
 #pragma once
 
 #include <array>
@@ -12,7 +12,7 @@
 
 namespace ricochet {
 
-/// An input of a policy, and its typical range: the network receives (input - `centre`) / `width`.
+/// An input of a policy and its typical range. The network receives (input - `centre`) / `width`.
 struct StepInput {
     std::string_view name;
     double centre = 0;

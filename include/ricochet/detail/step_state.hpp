@@ -23,7 +23,7 @@
 
 namespace ricochet::detail {
 
-/// The state that the loop works with where the caller's is X.
+/// Type of the loop's states where those of the caller are X.
 template <class X>
 using CoreState = std::conditional_t<(fixed_size<X>() >= 1 && fixed_size<X>() <= 4),
                                      std::array<double, fixed_size<X>()>, std::vector<double>>;

@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// The data of a run with a user-defined stepper, beside the system.
+// Data of a run with a user-defined stepper, in addition to the system.
 #pragma once
 
 #include <type_traits>

@@ -67,12 +67,12 @@ struct SurfaceOptions {
     double step = 0.01;           ///< h of the model, positive
     std::size_t events = 50'000;  ///< as many events as clear states keep the classes balanced
     std::size_t clear = 50'000;
-    double margin = 0.1;     ///< clear states nearer to the boundary than this are the band
+    double margin = 0.1;     ///< a clear state nearer to the boundary than this belongs to the band
     bool keep_band = false;  ///< keep the band, for an assessment, instead of counting it
     double longest = 1e3;    ///< [steps] furthest sample step backward where nothing else limits it
     double closest = 1e-6;   ///< [steps] sample steps approach 0, h and the horizon up to this
     double beyond_share =
-        0.1;  ///< states on the far side of the surface, as an earlier miss leaves them
+        0.1;  ///< fraction of states on the far side of the surface, as an earlier miss leaves them
     std::uint64_t seed = 1;
 };
 

@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// A system as the loop sees it: its functions as pointers, whatever their spellings.
+// A system as a table of pointers to functions, whatever form they have, for the loop.
 //
 // Functions that a system does not have are null. Each takes the door first, which holds the
 // system (detail/door.hpp). Rates are with respect to the offset in a step: in a run backward in

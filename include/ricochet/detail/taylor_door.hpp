@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// The data of a run by Taylor's method beside the system: the constants of its flow, and the
+// The data of a run by Taylor's method besides the system: the constants of its flow, and the
 // current step.
 #pragma once
 

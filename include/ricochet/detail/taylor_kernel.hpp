@@ -115,7 +115,7 @@ class TaylorKernel {
         return step.reach;
     }
 
-    /// False where the end is not finite.
+    /// Takes a step. False: its end is not finite.
     [[gnu::always_inline]] static bool go(D& of, State& state, double h)
     {
         const TStep& step = of.step;
@@ -151,7 +151,7 @@ class TaylorKernel {
         double longest = step.reach;
         if (!(longest >= 0)) longest = reach(door, state, rtol, atol);
         if (!go(at(door), state, h)) return std::numeric_limits<double>::quiet_NaN();
-        // A step may be stretched by millionths to reach the end of a run.
+        // A step may be longer by millionths, to reach the end of a run.
         return h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, step.order);
     }
 
@@ -243,7 +243,7 @@ class TaylorKernel {
         }
         return true;
     }
-    /// Relative to a root: its square is rounding, so the motion is straight over this fraction.
+    /// Fraction of a root whose square is rounding: the motion is straight over it.
     static constexpr double straight_part = 0x1p-26;
     static constexpr int most_corrections = 3;
 

@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// Quiet steps of several runs by Taylor's method together, each with a length of its own.
+// Quiet steps of several runs by Taylor's method, computed together, each of its own length.
 //
 // The operations are those of `TaylorKernel` in its quiet runs, one by one, so that
 // every run has the bits that it has alone. A lane takes a step here only where the kernel would
@@ -196,7 +196,7 @@ public:
     /// Takes over a run before steps that may be quiet.
     void load(std::size_t lane, D& door, State& state, const QuietRun& quiet)
     {
-        // Lanes that were never used get the numbers of a run too, which do no harm.
+        // Lanes that were never used get the numbers of this run too; their results are ignored.
         for (std::size_t to = 0; to < lane_count; ++to) {
             if (to == lane || !used_[to]) put(to, door, state, quiet);
         }

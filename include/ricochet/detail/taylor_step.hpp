@@ -95,7 +95,7 @@ template <class X, class Array>
     return h;
 }
 
-/// What the coefficients of the current step were computed from.
+/// Identity of the step for which coefficients were computed.
 struct TaylorStepOrigin {
     Instant start;
     Mode mode = 0;

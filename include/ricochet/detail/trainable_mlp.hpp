@@ -18,7 +18,7 @@
 
 namespace ricochet::learn {
 
-/// Parameters are one vector: layer by layer the weight, outputs x inputs row by
+/// A network whose parameters are one vector: layer by layer the weight, outputs x inputs row by
 /// row, then the bias.
 class TrainableMlp {
 public:
@@ -75,7 +75,7 @@ private:
     Activation activation_;
     std::vector<Shape> shapes_;
     std::vector<double> parameters_;
-    std::size_t lanes_ = 0;                         ///< states in work, a multiple of the block
+    std::size_t lanes_ = 0;                         ///< states in the work space, in whole blocks
     std::vector<std::vector<double>> activations_;  ///< per layer, width x lanes; 0: the input
     std::vector<std::vector<double>> slopes_;       ///< dL/d of the input of the activation
     std::vector<double> logits_, logit_slopes_;     ///< of one state

@@ -448,7 +448,7 @@ private:
         dydt[y.size() - 1] = 0;
     }
 
-    /// Once a derivative is undefined, the values computed here are not used.
+    /// Values computed here after a derivative has become undefined are not used.
     template <class S>
     void variational_series(Mode mode, const S& t, const std::vector<S>& y,
                             std::vector<S>& dydt) const

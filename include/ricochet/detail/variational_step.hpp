@@ -6,7 +6,7 @@
 //     m x'' = k (x_p(t) - x) - N f(x', xi),      xi' = xi'(x', xi)
 //
 // The methods are singly diagonally implicit Runge-Kutta methods, L-stable and stiffly accurate:
-// every stage is one step of backward Euler from a shifted history, so the properties of the
+// every stage is one step of backward Euler from a shifted history, so that the properties of the
 // variational step of order 1 hold for all of them.
 #pragma once
 

@@ -1,9 +1,9 @@
-// All roots of the guard on the step's polynomial, excluded or isolated.
+// Detector that excludes or isolates all roots of a guard on the step's polynomial.
 //
 // A polynomial lies between the least and the greatest of its coefficients in Bernstein
 // form. Along a step's polynomial of degree m a guard that is a polynomial of degree k in
 // time and state is one of degree k m in the offset, and k m + 1 samples recover it up to
-// rounding: where all coefficients exceed the error of that, no root is possible, and
+// rounding: where all coefficients exceed that rounding, no root is possible, and
 // "no event" is proved. Other guards are interpolated, the interpolant is compared with
 // further samples, and the step is halved if they disagree: "no event" is checked.
 //
@@ -31,8 +31,8 @@ inline constexpr int most_bernstein_degree = 32;
 /// Degree of the interpolant of a guard of unknown degree.
 inline constexpr int sampled_degree = 8;
 
-/// Points at which a polynomial on [0, 1] is sampled: the extrema of the Chebyshev polynomial of
-/// that degree, ascending, `degree` + 1 of them. @param degree in [1, 32]
+/// The `degree` + 1 points at which a polynomial on [0, 1] is sampled, ascending: the extrema of
+/// the Chebyshev polynomial of that degree. @param degree in [1, 32]
 [[nodiscard]] const double* bernstein_nodes(int degree) noexcept;
 
 /// The guard along the step's polynomial, as a function of the offset [s].
@@ -66,9 +66,9 @@ struct BernsteinTask {
 
 }  // namespace detail
 
-/// Evidence `proved` holds for the polynomial through the guard's samples. It assumes that the
-/// samples are rounded to four units in the last place of the largest, and that the degree declared
-/// by the system is right. For a method without dense output this detector costs further steps.
+/// Detector that excludes or isolates roots by Bernstein coefficients. The evidence `proved` holds
+/// for the polynomial through the guard's samples if they are rounded to four units in the last
+/// place of the largest and the declared degree is right. Costs steps without dense output.
 struct Bernstein {
     static constexpr bool uses_rates = true;
     static constexpr Screening screening = Screening::every;

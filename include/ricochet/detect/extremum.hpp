@@ -20,7 +20,7 @@ struct Ends {
     static constexpr Screening screening = Screening::ends;
     static constexpr Evidence evidence = Evidence::assumed;  ///< evidence for a step not suspected
 
-    /// Whether a step needs a check, in the guard times `sign`, positive on its
+    /// Whether a step needs a check, from the guard times `sign`, which is positive on its
     /// armed side.
     [[nodiscard]] static constexpr bool suspects(double sign, double /*g0*/, double /*rate0*/,
                                                  double g1, double /*rate1*/, double /*h*/) noexcept
@@ -62,14 +62,14 @@ struct Extremum {
     static constexpr bool checks_inside = true;  ///< compares each step with the cubic of its ends
     static constexpr Evidence evidence = Evidence::checked;  ///< evidence for a step not suspected
 
-    /// Whether a step needs a check, in the guard times `sign`, positive on its armed side: the
+    /// Whether a step needs a check, from the guard times `sign`, positive on its armed side: the
     /// guard has left that side, or the control points of its cubic reach across the surface, or it
     /// turns back from the surface. A guard that turns back needs no check if its control points
     /// differ by less than a fifth of their largest: to reach the surface it would have to bend
     /// five times as much as its values and rates at the ends show.
     ///
-    /// The expression is free of branches, and in terms that `CubicCheck` has as well, so that a
-    /// loop over many guards is vectorised.
+    /// The expression has no branches and shares its terms with `CubicCheck`, so that a loop over
+    /// many guards is vectorised.
     [[nodiscard, gnu::always_inline]] static constexpr bool suspects(double sign, double g0,
                                                                      double rate0, double g1,
                                                                      double rate1,

@@ -24,8 +24,8 @@ namespace ricochet {
 // The network proposes which exact checks to defer, and every interval is closed
 // by an exact check that covers all of it. An interval longer than one step can be covered only by
 // a bound on the guard's rate; without a declared bound no interval can be
-// covered, and every step keeps its exact check. The network is then evaluated without
-// gain, as the statistics show: no deferred checks, and how often its prediction would have
+// covered, and every step keeps its exact check. The network then saves nothing: the
+// statistics show no deferred checks, and how often its prediction would have
 // been right. For any weights the events are those of the exact detector,
 // bit for bit.
 
@@ -163,7 +163,7 @@ private:
     std::size_t longest_;
 };
 
-/// Uses the levels of a calibrated gate as lower bounds of the guard in the planner, beside the
+/// Uses the levels of a calibrated gate as lower bounds of the guard in the planner, along with the
 /// bounds that the system declares: misses events at the rate of its calibration.
 template <class Exact = Extremum>
 class CalibratedBounds : public detail::AsksGate<Planned<Exact>> {

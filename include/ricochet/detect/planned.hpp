@@ -115,14 +115,14 @@ struct GuardBound {
 //     SlopeSkip    skips a fraction of the time in which the guard would reach its surface at
 //                  its last slope; may miss events, too
 //
-// `Planned` on a system without bounds is the exact detector, and compiles to it.
+// `Planned` on a system without bounds is compiled to the exact detector.
 
 /// How `Planned` plans.
 struct PlannerOptions {
-    /// Take steps before they are closed by a check at the end of their interval, and take
-    /// them back if it could not be closed. Off: only as far as the bound covers with certainty.
+    /// Take steps tentatively, until a check at the end of their interval closes it, and roll back
+    /// to the first that could not be closed. Off: advance only as far as the bound covers.
     bool two_ended = true;
-    /// Largest number of steps taken before they are closed; as many starts of steps are kept.
+    /// Largest number of tentative steps in an interval; the starts of as many steps are kept.
     std::size_t longest_interval = 256;
     /// Fraction by which every bound is enlarged, since bounds hold for the motion and steps have
     /// errors. At least 0.

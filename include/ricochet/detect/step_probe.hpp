@@ -4,8 +4,8 @@
 // any system along a step of any method.
 //
 // A state inside a step can be obtained in two forms. Repeating the step from its start with
-// another length is as accurate as the method, and is used where the motion changes
-// course. The step's polynomial is nearly as accurate and can be evaluated one component at
+// another length is as accurate as the method, and is used for events that change the
+// motion. The step's polynomial is nearly as accurate and can be evaluated one component at
 // a time, and is used for events that are only recorded.
 //
 // Times inside a step are offsets s in [0, h] from its start, because an offset
@@ -157,13 +157,13 @@ public:
     {
         return sample(s, dense_point_at(s));
     }
-    /// The guard at offset s, on the straight line through `sample`, the last that
-    /// `value_and_rate` took, or on the polynomial.
+    /// The guard at offset s: on the straight line along the flow through `from`, which must be the
+    /// last sample that `value_and_rate` took, or on the polynomial.
     [[nodiscard]] GuardSample along_the_flow(const GuardSample& from, double s)
     {
         return {.s = s, .value = value_along_the_flow(from.s, s), .rate = from.rate};
     }
-    /// Tells the path that the root lies `correction` [s] after `sample`, the last that
+    /// Tells the path that the root lies `correction` [s] after the last sample that
     /// `value_and_rate` took, and that the motion is straight until there.
     virtual void settle(double correction) = 0;
     /// The rate of the guard at a sample for which it is not known yet.
@@ -379,7 +379,7 @@ private:
         } else if constexpr (DenseStep<Step, State>) {
             return DenseView<State, derivative>(step.dense(), s);
         } else {
-            return DenseView<State, derivative>({}, s);  // of no use
+            return DenseView<State, derivative>({}, s);  // never evaluated
         }
     }
     using View = decltype(component_view<false>(std::declval<const Step&>(), 0.0));
@@ -477,8 +477,8 @@ private:
     double placed_ = std::numeric_limits<double>::quiet_NaN();
 };
 
-/// A detector's check of a whole step of a host's own integrator: the guard armed on
-/// `watch.side` and sampled at the start; its sample at the end is filled in.
+/// Runs a detector on a whole step of a host's own integrator, with the guard armed on
+/// `watch.side` and sampled at the start. Fills in its sample at the end.
 template <class Detector, class Guard, class Step>
 [[nodiscard]] Finding examine_step(const Detector& detector, const Guard& guard, const Step& step,
                                    Watch& watch)

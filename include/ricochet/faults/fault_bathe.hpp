@@ -27,7 +27,7 @@ namespace ricochet {
 /// Accumulated slip at which the strength in a stage is evaluated.
 enum class FaultBound {
     implicit,  ///< at the end of the stage
-    /// at the path extrapolated with the velocity of its start: always convex, also of order 2
+    /// at the slip extrapolated with the initial velocity of the stage: always convex, also order 2
     extrapolated,
 };
 
@@ -76,7 +76,7 @@ struct BatheOptions {
 /// exp(-path), the fraction of elements that slip, and the logarithm of the mean drop of strength.
 [[nodiscard]] const StepLayout& fault_step_layout() noexcept;
 
-/// @throws std::invalid_argument naming the option.
+/// Validates the options. @throws std::invalid_argument naming the option.
 void validate(const BatheOptions& options);
 
 /// Runs the fault by Bathe's steps. `RuptureOptions::rtol` is not used. The time of rest is known
@@ -108,14 +108,14 @@ public:
     /// Whether the run has ended.
     [[nodiscard]] bool ended() const noexcept;
     [[nodiscard]] double t() const noexcept;  ///< [s]
-    /// Whether nothing moves, and nothing will.
+    /// Whether the fault is at rest and will stay at rest.
     [[nodiscard]] bool rests();
     /// The scaled error of the last step; 0 if none is estimated.
     [[nodiscard]] double error() const noexcept;
     /// View of the last step, or of the start, for a step policy.
     [[nodiscard]] const StepView& view() const noexcept;
     [[nodiscard]] const RuptureStatistics& statistics() const noexcept;
-    [[nodiscard]] double mean_slip() const;  ///< path [m]
+    [[nodiscard]] double mean_slip() const;  ///< accumulated slip [m]
 
 private:
     friend class BatheRuns;
@@ -124,8 +124,8 @@ private:
     std::unique_ptr<Parts> parts_;
 };
 
-/// Runs of one fault under many rules. What depends on the fault alone, a third of a millisecond of
-/// work for one element, is computed once. Not for two threads at a time.
+/// Runs of one fault under many rules. Quantities that depend on the fault alone, which take 0.3 ms
+/// for one element, are computed once. Not for use by two threads at a time.
 class BatheRuns {
 public:
     /// @param polynomial_bound  in place of `RuptureOptions::polynomial_bound`

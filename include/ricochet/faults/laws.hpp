@@ -7,7 +7,7 @@
 //
 // odd in V and smooth through V = 0. The speed that drives the state is then
 // s = sqrt(V^2 + w^2) - w in place of |V|, for which exact potentials exist; the two
-// differ by less than w, of the order of 1e-24 m/s, but where |V| is as small as that.
+// differ by less than w, which is of the order of 1e-24 m/s.
 #pragma once
 
 #include <cmath>
@@ -39,7 +39,7 @@ struct FrictionAndRateGradient {
 
 namespace detail {
 
-/// The direct effect at one point. Of the log form s = r = V and w = 0.
+/// The direct effect at one point. In the log form s = r = V and w = 0.
 struct DirectTerms {
     double friction;  ///< f
     double w;         ///< [m/s]
@@ -244,11 +244,11 @@ struct FrictionHistory {
     Between between = Between::constant;
     std::vector<double> t{};         ///< [s], rising
     std::vector<double> v{};         ///< [m/s], positive; at a jump the value after it
-    std::vector<double> friction{};  ///< empty where it is not known
+    std::vector<double> friction{};  ///< empty if it is not known
 };
 
-/// @throws std::invalid_argument for a history that is empty or unsorted, whose lists differ in
-/// length, or that has a slip rate that is not positive; the message says where.
+/// Validates a history. @throws std::invalid_argument, saying where, for a history that is empty or
+/// unsorted, whose lists differ in length, or that has a slip rate that is not positive.
 void validate(const FrictionHistory& history);
 
 /// theta of the ageing law over an interval in which the slip rate goes linearly from v0 to
@@ -269,7 +269,7 @@ struct AgeingState {
 [[nodiscard]] std::vector<double> ageing_friction(const RateStateParameters& parameters,
                                                   const FrictionHistory& history, double xi = 0);
 
-/// |found - expected| / |expected| in the Euclidean norm.
+/// Relative error |found - expected| / |expected| in the Euclidean norm.
 [[nodiscard]] double relative_error(const std::vector<double>& found,
                                     const std::vector<double>& expected);
 /// Same, relative to expected - f*, the part of friction that depends on state and rate.
@@ -279,7 +279,7 @@ struct AgeingState {
 /// Histories with the friction of the ageing law, xi = 0 at their start: half of them with
 /// one to five jumps, half continuous with two to eight corners, levels log-uniform in
 /// [1e-3, 10] V*, 100 samples 0.02 s apart. (The protocol of Liu, Bhattacharya and Lapusta,
-/// arXiv 2507.09796, section 4.2, with what it leaves open fixed.)
+/// arXiv 2507.09796, section 4.2, with our choice of what it leaves open.)
 [[nodiscard]] std::vector<FrictionHistory> make_histories(
     std::size_t count, std::uint64_t seed, const RateStateParameters& parameters = {});
 

@@ -171,8 +171,8 @@ template <PotentialPair Pair>
 //     Ddag = integral of A dV + beta V xi + beta V* c(xi),   c' = -e^C,
 //     D*   = beta V* g(d / (beta V*)),                        g' = G,
 //
-// convex in V, in xi and in d by construction; beta sets the unit of xi and is no
-// parameter of the fit.
+// convex in V, in xi and in d by construction; beta sets the unit of xi and is not
+// fitted.
 
 /// offset + slope z + sum of weight_i tanh(scale_i z + shift_i), of at most eight units. It
 /// rises where slope >= 0 and every weight_i scale_i >= 0.

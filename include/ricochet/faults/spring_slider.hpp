@@ -55,7 +55,7 @@ struct SpringSlider {
 
 /// Kinds of events of the slip rate.
 enum class SliderEventKind {
-    onset,     ///< it rises through the threshold: slip begins
+    onset,     ///< the slip rate rises through the threshold
     arrest,    ///< the slip rate falls through the threshold
     reversal,  ///< the slip rate passes through zero
 };
@@ -96,8 +96,8 @@ struct SliderRun {
 };
 
 /// Runs a slider by variational steps, with the asinh form of the direct effect. Steps end at the
-/// corners of the load. Events change nothing; they are located by repeating the step, to
-/// neighbouring doubles. Two crossings within a step are found if the cubic through slip rates and
+/// corners of the load. Events do not change the state; they are located to adjacent doubles, by
+/// repeating the step. Two crossings within a step are found if the cubic through slip rates and
 /// accelerations shows them.
 ///
 /// @throws std::invalid_argument for parameters or options outside their range.
@@ -115,8 +115,8 @@ struct SliderCase {
 
 /// 77 sliders, 35 of them softer than critical: k / k_crit log-uniform in [0.2, 0.95] or
 /// [1.05, 5], the velocity of the load in [0.5, 2] V*. They start at V*, xi = 0, with the
-/// spring drawn to N f*. (The source says only that such ranges were drawn from; these
-/// are ours.)
+/// spring drawn to N f*. (The source does not give the ranges that it
+/// drew from; these are ours.)
 [[nodiscard]] std::vector<SliderCase> slider_cases(std::uint64_t seed);
 [[nodiscard]] SliderState slider_case_start() noexcept;
 
@@ -127,7 +127,7 @@ struct SliderCase {
 /// State (x / D_RS, log(V / V*), xi), one guard, corners of the load as time events.
 ///
 ///     flow    x' = V,  m V' = k (x_p(t) - x) - N f(V, xi),  xi' = (V* e^-xi - V) / D_RS
-///     guard   log(V / threshold), either way: onset rising, arrest falling; nothing happens
+///     guard   log(V / threshold), either direction: onset rising, arrest falling; no reset
 ///
 /// Explicit steps are bounded by m V / (N a), which in stick-slip falls below a microsecond; the
 /// steps of `run_slider` are limited by accuracy alone. Functions are generic in the state type.

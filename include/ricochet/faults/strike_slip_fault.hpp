@@ -18,7 +18,7 @@ namespace ricochet {
 
 /// Medium around the fault.
 enum class FaultMedium {
-    full_space,  ///< elastic, without bounds: K depends on distances alone
+    full_space,  ///< unbounded elastic medium: K depends on distances alone
     half_space,  ///< elastic half-space whose free surface, at depth 0, the fault reaches
 };
 
@@ -34,7 +34,7 @@ enum class FaultMesh {
 /// that weakens with slip (D. M. Riley and others, Reinforcement Learning-based adaptive
 /// time-integration for nonsmooth dynamics, section 5.3).
 ///
-/// With slip d from the start, its path s, velocity v and mean density of mass rho L,
+/// With slip d from the start, accumulated slip s, velocity v and mean density of mass rho L,
 ///
 ///     d' = v,   s' = |v|
 ///     rho L v' = -G/L K d - H v + tau - r,    r in b(s) Sign(v)
@@ -136,11 +136,11 @@ struct RuptureOptions {
     /// [s] Longest step; 0: 0.29 time units, which is 0.25 s at 3 km, reduced to n / 100 of it as n
     /// falls from 100 to 10, where steps cost little. Limited to 0.95 of the stable step.
     double step = 0;
-    /// Error of a step allowed, relative to the present velocity and slip of the whole field;
+    /// Allowed error of a step, relative to the present velocity and slip of the whole field;
     /// infinity: constant steps.
     double rtol = 1e-4;
-    /// Error of the polynomial that stands for sqrt(K), relative on its whole spectrum; 0: 1e-4,
-    /// and (n / 100)^2 of it from n = 100 down to 10.
+    /// Largest relative error, over the spectrum of K, of the polynomial that replaces sqrt(K); 0:
+    /// 1e-4, times (n / 100)^2 as n falls from 100 to 10.
     double polynomial_bound = 0;
     std::vector<double> snapshot_times{};  ///< [s] ascending
     std::uint64_t max_steps = 1'000'000;
@@ -148,7 +148,7 @@ struct RuptureOptions {
     std::function<bool(double t)> progress{};
 };
 
-/// @throws std::invalid_argument naming the option, what was given and what was expected.
+/// Validates options. @throws std::invalid_argument naming the option, what was given and expected.
 void validate(const RuptureOptions& options);
 
 /// Slip and velocity of all elements at one time; the index along x varies fastest.
@@ -169,7 +169,7 @@ struct RuptureStatistics {
     std::uint64_t solves = 0;       ///< solutions of implicit stages
     std::uint64_t iterations = 0;   ///< iterations of Newton's method in them
     std::uint64_t asked = 0;        ///< verdicts of a learned rule
-    std::uint64_t handed_over = 0;  ///< of these, left to the classical one
+    std::uint64_t handed_over = 0;  ///< of these, left to the classical rule
     int degree = 0;                 ///< of the polynomial for sqrt(K)
     double bound = 0;               ///< bound of its relative error
 };
@@ -178,8 +178,8 @@ struct RuptureStatistics {
 struct Rupture {
     Outcome outcome = Outcome::reached_end;
     double t = 0;              ///< [s] reached
-    double mean_slip = 0;      ///< path, mean over the square [m]
-    double peak_velocity = 0;  ///< of the mean velocity [m/s]
+    double mean_slip = 0;      ///< accumulated slip, mean over the square [m]
+    double peak_velocity = 0;  ///< largest mean velocity [m/s]
     double peak_time = 0;      ///< time of the largest mean velocity [s]
     /// Time from which the mean velocity stays below 1e-3 of its peak [s]; of a single element,
     /// when it stops. NaN if it does not.
@@ -191,7 +191,7 @@ struct Rupture {
     Eigen::VectorXd slip;              ///< [m]
     Eigen::VectorXd velocity;          ///< [m/s]
     Eigen::VectorXd peak_velocity_of;  ///< largest velocity of each element at ends of steps [m/s]
-    Eigen::VectorXd arrival;           ///< when each was fastest [s]
+    Eigen::VectorXd arrival;           ///< time at which each element was fastest [s]
     std::vector<double> times;         ///< [s] four for each step
     std::vector<double> mean_slips;    ///< [m]
     std::vector<double> mean_velocities;  ///< [m/s]
@@ -224,9 +224,9 @@ struct Rupture {
 // Steps are singly diagonally implicit of order 1, 2 or 4 (variational_step.hpp); a stage
 // is that of fault_friction_stage.hpp.
 
-/// Rate-and-state friction on a fault, its load and its start: uniform but for the normal stress.
+/// Rate-and-state friction on a fault, its load and its start; uniform except for normal stress.
 struct FaultFriction {
-    /// With these and the defaults of the fault its softest mode has 0.4 of the critical stiffness
+    /// With this law and the default fault, the softest mode has 0.4 of the critical stiffness
     /// at the mean normal stress, and `elements_of_front` is 1 for 9 elements per side.
     RateStateParameters law{.a = 0.01, .b = 0.02, .f_star = 0.6, .v_star = 1e-6, .d_rs = 0.01};
     StateEvolution evolution = StateEvolution::ageing;
@@ -234,7 +234,7 @@ struct FaultFriction {
     double plate_velocity = 1e-9;  ///< V_pl [m/s], zero or positive
     double normal_stress = 0;      ///< sigma [Pa] of all elements; 0: that of the fault, with depth
     double slip_rate = 1e-9;       ///< V at the start [m/s], not zero; positive with the log form
-    std::optional<double> theta{};  ///< [s] at the start, positive; none: steady at |slip_rate|
+    std::optional<double> theta{};  ///< [s] at the start, positive; empty: steady at |slip_rate|
     /// tau = (1 + overload) sigma f at the start; above -1. With 0, a start at `plate_velocity` in
     /// its steady state continues to slide at that velocity, whether this is stable or not.
     double overload = 1e-5;
@@ -248,20 +248,20 @@ struct RateStateOptions {
     /// least `overload`, for which V is steady within that tolerance most of the time, 1.4e-3 and
     /// 9e-3. Order 4 costs 1.2 to 1.5 times more.
     int order = 4;
-    /// [s]; 0: |slip_rate| rho L / (a sigma), in which the direct effect ends an imbalance of the
-    /// start, at most a hundredth of the run.
+    /// [s]; 0: |slip_rate| rho L / (a sigma), the time in which the direct effect balances the
+    /// stresses of the start, but at most a hundredth of the run.
     double first_step = 0;
-    double tolerance = 1e-11;  ///< of a stage's residual, relative to the sizes of its terms
+    double tolerance = 1e-11;  ///< for the residual of a stage, relative to its terms
     int max_iterations = 40;   ///< iterations of Newton's method in a stage
     int max_inner = 200;       ///< iterations of conjugate gradients in one Newton iteration
     double threshold = 1e-3;   ///< [m/s] of the fastest element: onset and end of an earthquake
 };
 
-/// @throws std::invalid_argument naming the parameter or option, what was given and expected.
+/// Validate. @throws std::invalid_argument naming parameter or option, what was given and expected.
 void validate(const FaultFriction& friction);
 void validate(const RateStateOptions& options);
 
-/// While the fastest element is above the threshold. Times are interpolated within a step.
+/// An earthquake: the fastest element is above the threshold. Times are interpolated in a step.
 struct FaultEarthquake {
     double start = 0;                                       ///< [s]
     double end = std::numeric_limits<double>::quiet_NaN();  ///< [s]; NaN: when the run ends

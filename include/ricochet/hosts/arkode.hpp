@@ -1,8 +1,8 @@
 // The Runge-Kutta methods of SUNDIALS as hosts, see `hosts::Cvode`: ERKStep, explicit; ARKStep,
 // explicit, implicit or additive.
 //
-// Their dense output is of an order of its own, below that of most methods: events are located to
-// what it is worth.
+// Their dense output has an order of its own, below that of most methods, which limits the
+// precision with which events are located.
 #pragma once
 
 #include <arkode/arkode_arkstep.h>

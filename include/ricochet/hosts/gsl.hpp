@@ -73,7 +73,7 @@ private:
     {
         require(GSL_ODEIV_FN_EVAL(driver_.sys, t, x.data(), dxdt.data()));
     }
-    /// @throws std::runtime_error
+    /// @throws std::runtime_error if GSL reports an error
     static void require(int flag)
     {
         if (flag != GSL_SUCCESS)

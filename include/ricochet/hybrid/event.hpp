@@ -45,11 +45,11 @@ struct Bracket {
     double hi = 0;
 };
 
-/// One event. `t` lies in `bracket`, at the root of the guard as precisely as it is
-/// known, and `before` is the state there: on its surface up to rounding, on either
-/// side. The events of a set happen at one time, that of the set: for all but the
-/// first, `t` may lie outside their own `bracket`, by no more than the window, and
-/// `before` as far from their surface.
+/// One event. `t` lies in `bracket`, at the best estimate of the guard's root, and `before` is
+/// the state there: on its surface up to rounding, on either side. The events of a set have one
+/// common time, that of the latest root or of a time event: for the others `t` may lie beyond
+/// their own `bracket`, by no more than the window, and `before` as far beyond their surface as
+/// the guard moves in that time.
 template <class State>
 struct Event {
     double t = 0;  ///< [s]

@@ -232,9 +232,9 @@ public:
     /// A surface that the state is on or beyond counts as met, whichever guard has fired.
     ///
     /// On two surfaces: as steep but continuous switching would decide, see
-    /// `detail::follow_shares`, with the rates of each surface in units of the largest.
-    /// It starts from the weights with which the motion arrives; after an exit from the weights
-    /// a moment later; at a start or time event from (1/2, 1/2).
+    /// `detail::follow_shares`, with the rates of each surface in units of the largest. The
+    /// decision starts from the weights with which the motion arrives; after an exit, from those
+    /// a moment later; at a start or time event, from (1/2, 1/2).
     ///
     /// `meeting` returns the result in advance.
     template <StateVector X>
@@ -269,8 +269,8 @@ public:
     /// An accumulation of crossings of two surfaces leads onto their intersection. There is no
     /// other accumulation that Filippov's rule could continue: an accumulation of crossings of one
     /// surface is sliding of second order, which needs the rate of h as a second surface.
-    /// With one surface there is no `rest`, and such a run ends; with two it ends with a
-    /// state of NaN.
+    /// With one surface there is no `rest`, and such a run ends. With two, `rest` sets the state
+    /// to NaN, which ends the run.
     template <StateVector X>
     requires(surface_count == 2) [[nodiscard]] Mode
         rest(std::size_t which, Mode mode, double t, X& x) const
@@ -319,9 +319,9 @@ public:
         return number(rules_.decide(at, on, t, x));
     }
 
-    /// How the fields on either side of surface `which` meet at a point (t, x) of it. The
-    /// other surface is where `mode` says; if the motion slides there, sliding motions
-    /// take the place of the fields.
+    /// Type of the meeting of the fields on either side of surface `which` at a point (t, x) of
+    /// it. The other surface is where `mode` says; if the motion slides there, sliding motions
+    /// replace the fields.
     template <StateVector X>
     [[nodiscard]] Meeting meeting(std::size_t which, Mode mode, double t, const X& x) const
     {
@@ -329,8 +329,8 @@ public:
     }
 
     /// Weight a in [0, 1] of the field above in the motion, for each surface: 0 below,
-    /// 1 above. While sliding it is what the switching would be on average, such as the
-    /// force of sticking friction in units of its bounds.
+    /// 1 above. While sliding it is the average of the switching, such as the force of sticking
+    /// friction as a fraction of its bounds.
     template <StateVector X>
     [[nodiscard]] std::array<double, surface_count> shares(Mode mode, double t, const X& x) const
     {

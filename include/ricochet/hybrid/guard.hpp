@@ -42,7 +42,7 @@ struct GuardInfo {
     bool unilateral = false;       ///< g >= 0 bounds the motion
     bool boolean = false;          ///< only the sign has a meaning: no rates, bisection
     int degree = 0;                ///< a polynomial of this degree in (t, x) together; 0: unknown
-    double touch = 0;              ///< |g| at a zero of the rate that counts as a touch; not below
+    double touch = 0;              ///< |g| up to which a zero of the rate is a touch; at least
                                    ///< 64 units in the last place of the guard's size
 };
 

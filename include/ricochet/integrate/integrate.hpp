@@ -8,7 +8,7 @@ namespace ricochet {
 
 namespace detail {
 
-/// Whether a system declares an inclusion, to which its own `integrate` hands over.
+/// Whether a system declares an inclusion, which only the `integrate` of event_hand_over.hpp takes.
 template <class System>
 concept WantsHandOver = requires(const System& system)
 {

@@ -50,7 +50,7 @@ struct Options {
 
     bool stop_at_event = false;
     bool record_events = true;  ///< off: events are counted, not kept
-    bool event_states = true;   ///< off: events without reset are kept without their states
+    bool event_states = true;   ///< off: recorded events without their states, if sized at run time
     bool record_steps = false;  ///< keep every step, for `Run::solution`
 
     /// Times [s] at which the trajectory is recorded, in the order in which the run reaches

@@ -252,9 +252,9 @@ template <class X>
 /// not depend on the order in which guards are declared. Events are those of one call of
 /// `integrate`, however the caller drives the run.
 ///
-/// Exceptions from the functions of the system pass through unchanged. The simulation is then
-/// at the end of its last complete step with its events (`take`: at most as far back as its last
-/// step in which anything happened), and the next call continues with the bits of a run in which
+/// Exceptions from the functions of the system pass through unchanged. The simulation is then at
+/// the end of its last complete step with its events (in `take`: or at the start of the steps
+/// without events that led there), and the next call continues with the bits of a run in which
 /// nothing was thrown.
 template <class System, class X, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
@@ -265,7 +265,7 @@ class Simulation {
     static constexpr bool same = std::is_same_v<X, C>;
 
 public:
-    /// Prepares a run with the arguments of `integrate`. Keeps a reference to `system`.
+    /// Prepares a run with the arguments and errors of `integrate`. Keeps a reference to `system`.
     Simulation(const System& system, const X& x0, const Options& options,
                const Stepping& stepping = {}, const Detector& detector = {},
                const Locator& locator = {})
@@ -303,7 +303,7 @@ public:
     /// Cost and savings of the network of a `Metered` detector so far.
     [[nodiscard]] MeterReading meter() const requires Metering<Detector> { return loop_->meter(); }
 
-    /// Takes one step, with whatever events it holds. False: the run has ended. A detector
+    /// Takes one step, with any events that it holds. False: the run has ended. A detector
     /// that defers checks does not look ahead here, since every step is final.
     bool step() { return loop_->step(); }
 
@@ -338,8 +338,8 @@ public:
     /// Advances to the end and returns the result.
     [[nodiscard]] Run<X> take() { return detail::as_callers<X>(loop_->take(), shown_.x); }
 
-    /// Returns the result so far; before the end its outcome is `cancelled`. The simulation
-    /// is over.
+    /// Ends the simulation and returns the result so far; before the end its outcome is
+    /// `cancelled`.
     [[nodiscard]] Run<X> finish() { return detail::as_callers<X>(loop_->finish(), shown_.x); }
 
     /// State on which the future of the run depends. A simulation of the same system with the same

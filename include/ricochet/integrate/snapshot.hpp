@@ -49,7 +49,7 @@ namespace detail {
 /// @throws std::invalid_argument because `what` has a value that no run gives it.
 [[noreturn]] void throw_snapshot_is_no_state(std::string_view what);
 
-/// The name of a type as the compiler writes it, somewhere within this text.
+/// Text that contains the name of a type as the compiler writes it.
 template <class T>
 [[nodiscard]] constexpr const char* written_type() noexcept
 {

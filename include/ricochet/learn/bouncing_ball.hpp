@@ -23,10 +23,10 @@ enum class BallModel {
     any_step,    ///< recipe `ballistic`: every gravity, restitution, height and step
 };
 
-/// "fixed-step" or "any-step".
+/// Name of a kind: "fixed-step" or "any-step".
 [[nodiscard]] std::string_view name(BallModel kind) noexcept;
 
-/// @throws std::invalid_argument naming what was given and what is known.
+/// The kind of this name. @throws std::invalid_argument naming what was given and what is known.
 [[nodiscard]] BallModel ball_model_named(std::string_view name);
 
 /// Data and options of a training of a classifier of the ball.
@@ -61,7 +61,7 @@ struct BallTraining {
 ///   floor in [1e-3, 2e14] g h, all log-uniform, half of the speeds in
 ///   [0.03, 30] g h, where the boundary bends; |u| <= 1e14 g h^2, |v| <= 1e14 g h.
 ///
-/// @param keep_band  keep clear states inside the margin
+/// @param keep_band  whether to keep clear states whose margin is too small for training
 [[nodiscard]] SurfaceSample sample_ball(BallModel kind, const BallTraining& training,
                                         std::size_t events, std::size_t clear, std::uint64_t seed,
                                         bool keep_band);

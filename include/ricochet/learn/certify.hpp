@@ -1,4 +1,4 @@
-// Certification: a proof that where a network clears, the guard is above a margin.
+// Certification: a proof that, wherever a network clears the state, the guard is above a margin.
 //
 // *Statement.* For every state x in the domain of the model
 //
@@ -48,15 +48,15 @@
 
 namespace ricochet {
 
-/// The first guard of the system does not depend on time, and changes between two states by
-/// no more than it says:
+/// A system whose first guard does not depend on time, with a bound of its change between
+/// two states:
 ///
 ///     |guard(t, x) - guard(t, y)| <= guard_slack(h)   if |x_i - y_i| <= h_i for all i,
 ///
 /// as computed, with the guard's own rounding included. h is a state of nonnegative
 /// half-widths; a larger h gives no smaller slack. Examples: hypot(h_0, h_1) for a
 /// distance in the plane of x_0 and x_1; sum of L_i h_i for a guard with a constant L_i for each
-/// component, as the reach of an arm beyond joint i; infinity says nothing.
+/// component, as the reach of an arm beyond joint i; infinity is valid.
 template <class System, class X>
 concept SlackedGuard = Guarded<System, X> && requires(const System& system, const X& half_widths)
 {
@@ -65,9 +65,9 @@ concept SlackedGuard = Guarded<System, X> && requires(const System& system, cons
         } -> std::convertible_to<double>;
 };
 
-/// It also bounds its guard from below over a box of states, the guard's own rounding included:
-/// guard(t, x) >= guard_least(lower, upper) if lower_i <= x_i <= upper_i for all i. -infinity says
-/// nothing. Its slack then only says along which edge a box is cut.
+/// A system that also bounds its guard from below over a box of states, rounding included:
+/// guard(t, x) >= guard_least(lower, upper) if lower_i <= x_i <= upper_i for all i. -infinity is a
+/// valid bound. The slack then serves only to choose the edge along which a box is cut.
 template <class System, class X>
 concept LeastGuard = SlackedGuard<System, X> && requires(const System& system, const X& corner)
 {
@@ -85,7 +85,7 @@ namespace ricochet::learn {
 struct GuardProblem {
     std::function<double(const double* x)> guard;
     std::function<double(const double* half_widths)> slack;  ///< see `SlackedGuard`
-    /// See `LeastGuard`; empty: there is none.
+    /// See `LeastGuard`; empty if there is none.
     std::function<double(const double* lower, const double* upper)> least{};
 };
 
@@ -94,8 +94,8 @@ struct CertifyOptions {
     double margin = 0;       ///< of the first level, in units of the guard
     std::size_t levels = 1;  ///< number of levels, 1 to 32
     double ratio = 2;        ///< between margins; above 1, needs a positive margin
-    /// Margins of each level, rising, instead of the three above. Empty, and the model a gate of
-    /// levels: those of the gate.
+    /// Margins of all levels, rising, in place of the three options above. If this is empty and
+    /// the model is a level gate, the margins are those of the gate.
     std::vector<double> margins{};
     /// Search for the highest threshold that can be proved, and store it in the model. Otherwise
     /// the stored threshold is proved as it is; further levels are always searched for.
@@ -103,7 +103,7 @@ struct CertifyOptions {
     /// A search stops at this distance from the lowest logit that was found within the margin,
     /// in units of the spread of the logits over the domain.
     double closest = 1.0 / 64;
-    double smallest = 1.0 / 1024;    ///< edge that is not cut further, as a share of the domain's
+    double smallest = 1.0 / 1024;    ///< edge that is not cut further, over the domain's
     std::size_t max_unproved = 256;  ///< boxes that a level may list
     double limit = 300;              ///< [s] a level whose estimate exceeds this is not started
     double time_limit = std::numeric_limits<double>::infinity();  ///< [s] when the proof stops
@@ -132,13 +132,13 @@ struct CertifyProgress {
     Estimate estimate;        ///< of this level
     std::uint64_t boxes = 0;  ///< examined so far, at this level
     double rate = 0;          ///< [1/s]
-    double seconds = 0;       ///< spent on this level, earlier parts included
+    double seconds = 0;       ///< [s] time on this level, earlier parts included
     double seconds_left = 0;
-    double share = 0;  ///< of the level that is done, in [0, 1]
+    double share = 0;  ///< fraction of the level that is done, in [0, 1]
 };
 
-/// Draws a bar, or returns false to stop. The first call for a level has `boxes` = 0, so that the
-/// estimate is known before the work starts.
+/// Receives the progress; returns false to stop the proof. The first call for each level has
+/// `boxes` = 0 and reports the estimate before the work starts.
 using CertifyCallback = std::function<bool(const CertifyProgress&)>;
 
 /// How a proof ended.
@@ -157,17 +157,17 @@ enum class CertifyOutcome {
 /// outcome is `interrupted`.
 struct CertifyInterrupted {};
 
-/// One sentence with the remedy.
+/// Describes the outcome in one sentence, with a remedy.
 [[nodiscard]] std::string_view describe(CertifyOutcome outcome) noexcept;
 
 /// Result and cost of a proof.
 struct CertifyReport {
     CertifyOutcome outcome = CertifyOutcome::proved;
-    std::vector<CertificateLevel> levels{};  ///< that were finished
-    std::vector<Estimate> estimates{};       ///< of these, and of the level that was not finished
+    std::vector<CertificateLevel> levels{};  ///< finished levels
+    std::vector<Estimate> estimates{};       ///< of these and of the unfinished level
     std::vector<double> counterexample{};    ///< state that refutes the statement, if `refuted`
     double seconds = 0;                      ///< [s] total time, searches and estimates included
-    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    /// Reason why the last checkpoint could not be written; empty if it was, or there is none.
     std::string checkpoint_trouble{};
 };
 
@@ -191,8 +191,8 @@ struct CertifiedModel {
 /// short by `limit`, and so depends on the speed of the machine.
 ///
 /// @throws std::invalid_argument if an option is outside its range, if the recipe of the model is
-///         not `state`, if it is a gate of horizons (which speak of times, not of values), as
-///         `NetworkBounds`, or if slack or least guard are found broken, with the states.
+///         not `state`, if the model is a horizon gate (which predicts times, not guard values),
+///         as `NetworkBounds`, or if slack or least guard are violated, naming the states.
 /// @throws std::runtime_error if the checkpoint cannot be written or read, or belongs to another
 ///         model or other options.
 [[nodiscard]] CertifiedModel certify(const Model& model, const GuardProblem& problem,
@@ -215,8 +215,8 @@ struct LowestLogit {
 [[nodiscard]] LowestLogit lowest_logit(const Model& model, const GuardProblem& problem,
                                        double margin, std::size_t states, std::uint64_t seed);
 
-/// The problem of a system and a model of it.
-/// @param like  any state, for its size
+/// Makes the problem of proving `model` against the first guard of `system`.
+/// @param like  any state of the right size
 /// @throws std::invalid_argument naming what the model is for and what the system is: name,
 ///         parameters, number of components; or if the recipe of the model is not `state`.
 template <class System, class X>

@@ -33,30 +33,30 @@ struct TrainingOptions {
     std::size_t iterations = 20'000;
     std::size_t batch = 256;   ///< states an iteration, half of them events
     double rate = 3e-3;        ///< learning rate at the start, [1/iteration]
-    double final_rate = 1e-5;  ///< and at the end; half a cosine between them
+    double final_rate = 1e-5;  ///< the same at the end; half a cosine in between
     Adam::Options adam{};
 
-    double hard_share = 0.5;        ///< of a batch, drawn from the hardest states
-    double hard_pool = 0.05;        ///< share of the training states that count as hardest
+    double hard_share = 0.5;        ///< fraction of a batch drawn from the hardest states
+    double hard_pool = 0.05;        ///< fraction of the training states counted as hardest
     std::size_t hard_every = 1000;  ///< iterations between two searches for them
 
-    double test_share = 0.1;           ///< held out and never examined in training
-    double validation_share = 0.1;     ///< of the rest; chooses weights and threshold
+    double test_share = 0.1;           ///< fraction held out and never examined in training
+    double validation_share = 0.1;     ///< fraction of the rest, to choose weights and threshold
     std::size_t evaluate_every = 500;  ///< iterations between two checks at the validation set
-    double logit_margin = 1;           ///< least distance of the threshold below the lowest event
+    double logit_margin = 1;           ///< least distance of the threshold below any event's logit
     double gap_share = 0.5;  ///< the same as a fraction of the gap to the highest clear state
     double cleared_at_least = 0.5;  ///< fraction of clear states that the threshold must clear
 
     std::uint64_t seed = 1;
-    std::filesystem::path checkpoint{};   ///< written now and then and on stopping; empty: none
+    std::filesystem::path checkpoint{};   ///< written periodically and on stopping; empty: none
     std::size_t checkpoint_every = 5000;  ///< iterations
     bool resume = false;                  ///< continue from `checkpoint`
     /// Read before every iteration; true stops the training, as the callback does. May be null.
     const std::atomic<bool>* cancelled = nullptr;
 };
 
-/// Cost of the runs of a training, by a few of them. Where these have no event, it is what
-/// all the steps cost that the training may take.
+/// Cost of the runs that a training needs, extrapolated from a few of them. If these have no
+/// event, it is the cost of the largest number of steps that the training may take.
 struct TrainingEstimate {
     std::uint64_t guard_calls = 0;
     double seconds = 0;        ///< [s] processor time
@@ -74,13 +74,13 @@ struct Progress {
     double loss = 0;         ///< mean binary cross entropy on the validation set
     std::size_t misses = 0;  ///< validation events with a negative logit
     double seconds = 0;      ///< elapsed, earlier parts of a resumed training included
-    /// Other values than "training": work before or after it, where `iteration` counts events.
+    /// "training", or the work before or after it, in which `iteration` counts events.
     std::string_view stage = "training";
-    /// In the first report of a training whose states come from runs.
+    /// Set in the first report of a training whose states come from runs.
     std::optional<TrainingEstimate> estimate{};
 };
 
-/// Cost and result of one way of looking for events.
+/// Cost and result of one way of detecting events.
 struct Rival {
     std::string name;  ///< "every step", "every 4 steps", ...
     std::uint64_t guard_calls = 0;
@@ -92,7 +92,7 @@ struct Rival {
 /// without rivals. The first rival is `Extremum` at every step.
 [[nodiscard]] std::string describe(const std::vector<Rival>& rivals);
 
-/// Draws a bar, or returns false to stop the training; the best so far is kept.
+/// Receives the progress; returns false to stop the training, whose best weights are kept.
 using ProgressCallback = std::function<bool(const Progress&)>;
 
 /// How a training ended.
@@ -103,7 +103,7 @@ enum class TrainingOutcome {
     diverged,       ///< the loss is not finite; the best before that is kept
 };
 
-/// One sentence with the remedy.
+/// Describes the outcome in one sentence, with a remedy.
 [[nodiscard]] std::string_view describe(TrainingOutcome outcome) noexcept;
 
 /// Result of a training. All figures are those of the stored weights, rounded to float.
@@ -116,7 +116,7 @@ struct Report {
     Assessment validation;            ///< the set the threshold was chosen on
     Assessment held_out;              ///< the test set
     std::optional<Assessment> fresh;  ///< new balanced states, band included
-    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    /// Reason why the last checkpoint could not be written; empty if it was, or there is none.
     std::string checkpoint_trouble{};
 };
 

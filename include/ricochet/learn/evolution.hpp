@@ -45,8 +45,8 @@ struct EvolutionOptions {
 
     unsigned threads = 2;  ///< 1 to 64; the result does not depend on it
 
-    /// Written at the end of the search, and before that once in a while between two
-    /// generations; empty: none.
+    /// Checkpoint file, written periodically between generations and at the end of the
+    /// search; empty: none.
     std::filesystem::path checkpoint{};
     bool resume = false;  ///< continue from `checkpoint`, to the same bits
 };
@@ -79,7 +79,7 @@ enum class EvolutionOutcome {
     none_allowed,  ///< no x had a score below infinity in `stagnant_generations` in a row
 };
 
-/// One sentence with the remedy.
+/// Describes the outcome in one sentence, with a remedy.
 [[nodiscard]] std::string_view describe(EvolutionOutcome outcome) noexcept;
 
 /// Number of consecutive generations without a score below infinity after which the search gives
@@ -95,7 +95,7 @@ struct EvolutionResult {
     std::size_t evaluations = 0;
     std::size_t generations = 0;
     double seconds = 0;
-    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    /// Reason why the last checkpoint could not be written; empty if it was, or there is none.
     std::string checkpoint_trouble{};
 };
 

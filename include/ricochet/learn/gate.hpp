@@ -2,13 +2,13 @@
 //
 // A *horizon* gate is for guards of which only the value or the sign is known. States come from
 // runs; each is labelled with the time to the next event. Since a gated run examines the guard at
-// the end of every horizon, it still finds an event that was cleared, unless the guard, followed
-// without its reset, has returned by then. Such states are *fatal*. The threshold of each horizon
+// the end of every horizon, it still finds an event that was cleared, unless the guard, without its
+// reset, has changed sign again by then. Such states are *fatal*. The threshold of each horizon
 // lies below the logit of every fatal state that was seen, and low enough that rolling back does
 // not cost more than the skipped checks save.
 //
-// A *level* gate is for a guard with a bound and a value: a regression from below of the guard,
-// with a threshold for each level below the logit of every state whose guard is not above it.
+// A *level* gate is for a guard with a value and a bound. Its network estimates the guard from
+// below; each level's threshold is below the logit of every state whose guard is not above it.
 //
 // `learn/train_gate.hpp` samples the runs and trains a gate in one call.
 #pragma once
@@ -45,7 +45,7 @@ struct RunStart {
     Mode mode = 0;
 };
 
-/// Draws starts. A start that the system rejects (behind a unilateral guard) is drawn again.
+/// Generator of starts. A start that the system rejects (behind a unilateral guard) is redrawn.
 template <class X>
 using Starts = std::function<RunStart<X>(Random&)>;
 
@@ -70,7 +70,7 @@ template <class X>
     };
 }
 
-/// Horizons [s] of the given numbers of steps.
+/// Returns the horizons [s] that span the given numbers of steps of length `step` [s].
 [[nodiscard]] inline std::vector<double> horizons(double step,
                                                   std::initializer_list<std::size_t> steps)
 {
@@ -79,7 +79,7 @@ template <class X>
     return out;
 }
 
-/// Gates of horizons [s], or of levels of the guard.
+/// Whether a gate predicts horizons [s], or levels of the guard.
 enum class GateKind { horizon, level };
 
 /// "gate-horizon" or "gate-level", as a model spells it.
@@ -96,13 +96,13 @@ struct GateTraining {
     /// Fixed steps [s] are drawn from this range, run by run; ignored with error control.
     double step_min = 0;
     double step_max = 0;
-    double run_length = 10;  ///< [s] of a run; the next one starts somewhere else
+    double run_length = 10;  ///< [s] length of a run; the next one has a new start
 
     std::size_t events = 3000;             ///< of the training runs
-    std::size_t states = 200'000;          ///< kept for training, at most
+    std::size_t states = 200'000;          ///< largest number kept for training
     std::size_t validation_events = 1000;  ///< number of events that choose weights and thresholds
-    std::size_t fresh_events = 30'000;     ///< for the miss rate; 0: it is not measured
-    std::size_t most_steps = 100'000'000;  ///< of each of these sets of runs
+    std::size_t fresh_events = 30'000;     ///< to measure the miss rate; 0: not measured
+    std::size_t most_steps = 100'000'000;  ///< largest number in each of these sets of runs
 
     std::vector<std::size_t> hidden{16, 16};
     std::size_t iterations = 4000;  ///< iterations in a round
@@ -114,9 +114,9 @@ struct GateTraining {
     double final_rate = 3e-5;
     std::size_t evaluate_every = 250;
     std::size_t patience = 8;    ///< evaluations without improvement after which a round ends
-    double fatal_weight = 4;     ///< of a fatal state in the loss
-    double quantile = 0.98;      ///< of a level gate: the share of states that it stays below
-    double logit_margin = 0.25;  ///< of the threshold below the lowest fatal logit
+    double fatal_weight = 4;     ///< weight of a fatal state in the loss
+    double quantile = 0.98;      ///< fraction of guards that a level gate underestimates
+    double logit_margin = 0.25;  ///< distance of a threshold below the lowest fatal logit
     std::uint64_t seed = 1;
 
     std::filesystem::path checkpoint{};  ///< written at every evaluation; empty: none
@@ -130,9 +130,9 @@ struct GateSamples {
     std::size_t width = 0;         ///< features of a state
     std::vector<double> features;  ///< row by row
     std::vector<double> event;     ///< [s] to the next event; infinite: beyond all horizons
-    std::vector<double> back;      ///< [s] until the guard is seen on its side again, without reset
+    std::vector<double> back;      ///< [s] until the guard is back on its armed side, without reset
     std::vector<double> value;     ///< of the guard, on the side on which it is armed
-    std::vector<double> weight;    ///< number of states of the runs that it represents; 0: none
+    std::vector<double> weight;    ///< number of states of the runs that the row represents
     std::uint64_t events = 0;      ///< number of events of the runs
     std::uint64_t steps = 0;
     std::vector<Interval> box;  ///< box of all states of the runs
@@ -146,24 +146,24 @@ struct GateSamples {
     /// Appends one state.
     void append(std::span<const double> row, double event, double back, double value,
                 double weight);
-    /// All states of `other`, which are of as many features.
+    /// Appends all states of `other`, which must have the same number of features.
     void append(const GateSamples& other);
-    /// Widens the box.
+    /// Widens `box` to contain the features `row`.
     void visit(std::span<const double> row);
 };
 
 /// Comparison of a gate with the exact detector on the same runs.
 struct GateTrial {
     std::uint64_t events = 0;       ///< of the exact runs
-    std::uint64_t misses = 0;       ///< of these, not found, or not at the same time but for errors
+    std::uint64_t misses = 0;       ///< of these, missed, or found at a time off by more than error
     std::uint64_t steps = 0;        ///< of the exact runs
     std::uint64_t exact_calls = 0;  ///< guard calls if every step is checked
     std::uint64_t gated_calls = 0;  ///< guard calls with the gate
     std::uint64_t network_calls = 0;  ///< of the gate
-    std::uint64_t outside = 0;        ///< states outside its box
+    std::uint64_t outside = 0;        ///< states outside the domain of the gate
     std::uint64_t repeated = 0;       ///< steps taken again
     double seconds = 0;               ///< [s] processor time of both
-    std::vector<Rival> rivals{};  ///< other ways of looking, on some of these runs; the gate last
+    std::vector<Rival> rivals{};  ///< other ways of detection, on some of these runs; the gate last
 
     [[nodiscard]] double miss_bound() const;  ///< at 95 % confidence
     /// Guard calls if every step is checked, divided by guard calls with the gate.
@@ -178,13 +178,13 @@ struct GateTrial {
 struct GateReport {
     TrainingOutcome outcome = TrainingOutcome::finished;
     std::size_t iterations = 0;
-    double seconds = 0;               ///< of training and sampling, without the trial
+    double seconds = 0;               ///< [s] of training and sampling, without the trial
     std::size_t training_states = 0;  ///< training states, including those added after rounds
     std::size_t fatal_states = 0;     ///< of these, fatal
     std::uint64_t events = 0;         ///< in all runs before the trial
     double looks = 1;                 ///< exact checks per step, as estimated on the validation set
     GateTrial trial;
-    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    /// Reason why the last checkpoint could not be written; empty if it was, or there is none.
     std::string checkpoint_trouble{};
 };
 
@@ -194,7 +194,7 @@ struct TrainedGate {
     GateReport report;
 };
 
-/// The report as a JSON object.
+/// Returns the report as the text of a JSON object.
 [[nodiscard]] std::string to_json(const GateReport& report);
 
 /// The training of one gate on given states. These, the options and the seed determine the result,
@@ -214,10 +214,10 @@ public:
     /// @throws std::runtime_error if the checkpoint cannot be written.
     [[nodiscard]] bool run(std::size_t round, const ProgressCallback& progress);
 
-    /// More states, for the rounds to come and for the thresholds.
+    /// Adds states for the rounds to come and for the thresholds.
     void add(const GateSamples& samples);
 
-    /// The best so far. System, parameters and step range are left to the caller.
+    /// Model with the best weights so far. The caller sets system, parameters and step range.
     [[nodiscard]] Model model() const;
 
     /// Report of the training so far.
@@ -228,7 +228,7 @@ private:
     std::unique_ptr<State> state_;
 };
 
-/// @throws std::invalid_argument naming the option.
+/// Validates the options. @throws std::invalid_argument naming the option.
 void check(const GateTraining& training, bool fixed_step);
 
 }  // namespace ricochet::learn

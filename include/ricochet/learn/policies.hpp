@@ -17,7 +17,7 @@ namespace ricochet::learn {
 
 // The environment in which a reinforcement learner acts.
 
-/// Reward and end of an action; the observation after it is returned apart.
+/// Reward of an action, and whether it ends the episode. The observation is returned separately.
 struct Reaction {
     double reward = 0;
     bool terminal = false;   ///< the episode is over, and no reward can follow
@@ -56,7 +56,7 @@ struct PolicyTraining {
     std::size_t random_steps = 100;  ///< number of first steps with uniform actions and no updates
     std::size_t batch = 256;
     std::size_t buffer = 1'000'000;  ///< largest number of transitions kept
-    double discount = 0.99;          ///< of the reward per step, in [0, 1]
+    double discount = 0.99;          ///< discount factor per step, in [0, 1]
     double polyak = 0.005;           ///< target += polyak (network - target), in (0, 1]
     std::uint64_t seed = 1;
     unsigned threads = 2;  ///< 1 to 64; the result does not depend on it
@@ -81,11 +81,11 @@ struct PolicyProgress {
     std::size_t episodes = 0;  ///< ended so far
     /// Mean return of the episodes that ended since the last report, undiscounted; NaN: none.
     double mean_return = 0;
-    /// Loss of the last batch; NaN where there is none, or no report was due. The same holds for
+    /// Loss of the last batch; NaN if there is none, or no report was due. The same holds for
     /// the next two.
     double critic_loss = 0;
     double actor_loss = 0;
-    double temperature = 0;  ///< weight of the entropy; 0 for a trainer without
+    double temperature = 0;  ///< weight of the entropy; 0 for TD3, which has none
     double seconds = 0;      ///< so far
 };
 
@@ -102,7 +102,7 @@ enum class PolicyOutcome {
     diverged,     ///< weights are not finite; the policy is that of the last report
 };
 
-/// One sentence with the remedy.
+/// Describes the outcome in one sentence, with a remedy.
 [[nodiscard]] std::string_view describe(PolicyOutcome outcome) noexcept;
 
 /// A trained policy and its report.
@@ -118,7 +118,7 @@ struct TrainedPolicy {
     std::size_t steps = 0;  ///< number of steps taken
     std::size_t episodes = 0;
     double seconds = 0;
-    /// Why the last checkpoint could not be written; empty: it was, or there is none.
+    /// Reason why the last checkpoint could not be written; empty if it was, or there is none.
     std::string checkpoint_trouble{};
 };
 
@@ -176,7 +176,7 @@ struct Td3Options {
     double rate = 1e-3;                           ///< of Adam, for critics and actor
     double exploration = 0.1;                     ///< standard deviation of the noise on the action
     double smoothing = 0.2;                       ///< the same, on the action of a target
-    double smoothing_bound = 0.5;                 ///< that noise is clamped to +- this
+    double smoothing_bound = 0.5;                 ///< bound to which that noise is clamped
     std::size_t delay = 2;  ///< updates of the critics for each of the policy and the targets
 };
 

@@ -1,5 +1,5 @@
-// Training a policy that chooses steps (`nonsmooth/step_policy.hpp`), by what it is for: less work
-// for the same true error.
+// Training of policies that choose steps (`nonsmooth/step_policy.hpp`). The score of a policy is
+// the work that it saves at the same true error.
 //
 //     const StepFamily family = fault_family({.seed = 1});
 //     const TrainedStepPolicy trained = train_step_policy(family, {.seconds = 150});
@@ -38,7 +38,7 @@ struct StepRule {
     StepController controller = ErrorStep{.order = 3, .reject_above = 100};
     double tolerance = 1e-3;
     ErrorEstimate estimate = ErrorEstimate::embedded;
-    /// The first step, or all of them with `ConstantStep`, over that of the problem.
+    /// First step (every step of a `ConstantStep`) in units of `StepProblem::usual_step`.
     double step = 1;
     /// Called after every step with the fraction of the time that is done; false ends the run
     /// early.
@@ -73,7 +73,7 @@ struct StepProblem {
 /// Problems of one system.
 struct StepFamily {
     StepLayout layout;
-    bool judges_final = false;  ///< the final error counts as much as that over time
+    bool judges_final = false;  ///< the final error counts as much as the error over time
     std::vector<StepProblem> problems;
     std::vector<double> tolerances;  ///< tolerances used in a training
 };
@@ -81,14 +81,14 @@ struct StepFamily {
 /// Ranges of the parameters of a family of faults.
 struct FaultFamilyOptions {
     std::uint64_t seed = 1;
-    /// How many faults of 1 x 1, 2 x 2, ... elements.
+    /// Numbers of faults with 1 x 1, 2 x 2, ... elements.
     std::vector<int> counts{12, 10, 10};
 };
 
-/// Faults of random parameters, wide about the default ones: side 2 to 6 km, damping ratio 0.15 to
-/// 0.45, slip distance 0.05 to 0.2 m, drop of friction 0.05 to 0.2, overload 1e-6 to 1e-4; those
-/// that do not rupture within 80 s are drawn again. Work is counted in Newton iterations, the
-/// references are explicit runs with steps far shorter.
+/// Faults with random parameters around the defaults: side 2 to 6 km, damping ratio 0.15 to 0.45,
+/// slip distance 0.05 to 0.2 m, drop of friction 0.05 to 0.2, overload 1e-6 to 1e-4. A fault that
+/// does not rupture within 80 s is drawn again. Work is counted in Newton iterations; the
+/// references are explicit runs with far shorter steps.
 [[nodiscard]] StepFamily fault_family(const FaultFamilyOptions& options = {});
 
 /// A fault as a problem. Its reference is an explicit run until `t_end` [s], which reports to
@@ -150,7 +150,7 @@ public:
         double gain = 0;        ///< log of the factor saved in work, at the error reached
         double final_gain = 0;  ///< at the final error reached
         double off = 0;         ///< log(error / error of the classical rule)
-        double failed = 0;      ///< share that did not reach the end
+        double failed = 0;      ///< fraction of the runs that did not reach the end
     };
     /// Terms of the score of `rule`, by group and tolerance.
     [[nodiscard]] std::vector<Part> parts(const LearnedStep& rule) const;
@@ -173,9 +173,9 @@ struct SearchedSteps {
     StepTrial trial;
 };
 
-/// The sequence of `count` lengths with the least error that an evolution strategy finds, starting
-/// from equal ones. It is a yardstick for rules, which know only the past of a run. It may profit
-/// from where a step happens to end, and does not prove that there is no better sequence.
+/// Searches for the sequence of `count` step lengths with the least error, by an evolution strategy
+/// that starts from equal lengths. The result is a yardstick for rules, which know only the past of
+/// a run. It may exploit where a step happens to end, and is not proved to be optimal.
 [[nodiscard]] SearchedSteps search_steps(const StepProblem& problem, std::size_t count,
                                          std::size_t evaluations, std::uint64_t seed = 1,
                                          unsigned threads = 2, const StepWatch& watch = {});
@@ -188,8 +188,8 @@ struct StepTrainingOptions {
     unsigned threads = 2;
     std::filesystem::path checkpoint{};
     bool resume = false;
-    /// Asked at every step of every run, by several threads; false ends the training within
-    /// moments, as `EvolutionOutcome::stopped`.
+    /// Called at every step of every run, from several threads. If it returns false, the training
+    /// ends promptly with `EvolutionOutcome::stopped`.
     std::function<bool()> goes_on{};
 };
 
@@ -199,7 +199,7 @@ struct TrainedStepPolicy {
     EvolutionResult search;
 };
 
-/// The same family, whose runs throw `SearchStopped` as soon as `goes_on` returns false.
+/// Returns `family` with runs that throw `SearchStopped` as soon as `goes_on` returns false.
 [[nodiscard]] StepFamily stoppable(StepFamily family, std::function<bool()> goes_on);
 
 /// Searches for the weights, starting from a network that returns zero. The domain of the model is

@@ -9,10 +9,10 @@
 //     std::puts(trained.trial.describe().c_str());
 //     integrate(system, x0, options, FixedStep<Rk4>{}, Network(trained.model));
 //
-// After Saunders, Steyer and Kuether (SAND2023-06682C, eqs. 4 to 6), who sample a known event
-// surface: here the surface is where the events of runs lie. From there states are taken backward
-// in time, and labelled by a step of the method forward. The network sees the state alone, so that
-// flow and guard are to depend on nothing else.
+// Saunders, Steyer and Kuether (SAND2023-06682C, eqs. 4 to 6) sample a known event surface; here it
+// is sampled by the events of runs. From these, states are traced backward in time and labelled by
+// one step of the method forward. The network sees the state alone, so flow and guard must not
+// depend on anything else.
 #pragma once
 
 #include <algorithm>
@@ -40,15 +40,15 @@ namespace ricochet::learn {
 /// Options of `train_classifier`.
 struct ClassifierTraining {
     double step = 0;         ///< [s] fixed step for which the network is made, positive
-    double run_length = 10;  ///< [s] of a run; the next one starts somewhere else
+    double run_length = 10;  ///< [s] length of a run; the next one has a new start
 
     std::size_t surface_points = 2000;     ///< events of the runs, from which states are taken
     std::size_t states = 100'000;          ///< for training and testing, half of them events
     std::size_t fresh_states = 40'000;     ///< for the report, from other runs
     std::size_t trial_events = 1000;       ///< events of the runs that measure the cost
-    std::size_t most_steps = 100'000'000;  ///< of each of these sets of runs
+    std::size_t most_steps = 100'000'000;  ///< largest number in each of these sets of runs
     double margin = 0.05;  ///< clear states nearer to the boundary are not trained on
-    double widened = 0.1;  ///< the domain is the box of the runs, wider by this share on each side
+    double widened = 0.1;  ///< fraction by which the domain exceeds the box of the runs on a side
     std::uint64_t seed = 1;
     TrainingOptions training{};  ///< its seed is replaced by the one above
 };
@@ -63,11 +63,11 @@ struct ClassifierTrial {
     double exact_seconds = 0;         ///< [s] processor time
     double network_seconds = 0;
 
-    /// Whether the network saves time.
+    /// Whether runs with the network took less time than exact runs.
     [[nodiscard]] bool pays() const noexcept { return network_seconds < exact_seconds; }
 
     std::vector<Rival>
-        rivals{};  ///< other ways of looking, on some of these runs; the network last
+        rivals{};  ///< other ways of detection, on some of these runs; the network last
 
     /// One sentence that says which way of checking is faster, and what the network misses.
     [[nodiscard]] std::string describe() const;
@@ -85,9 +85,9 @@ struct TrainedClassifier {
 
 namespace detail {
 
-/// @throws std::invalid_argument naming the option.
+/// Validates the options. @throws std::invalid_argument naming the option.
 void check(const ClassifierTraining& training);
-/// @throws std::invalid_argument: the runs hold no event.
+/// @throws std::invalid_argument always: the runs hold no event.
 [[noreturn]] void throw_no_surface(std::uint64_t steps);
 /// @throws std::invalid_argument always: the state has more components than a network takes.
 [[noreturn]] void throw_too_many_components(std::size_t found, std::size_t most);
@@ -118,7 +118,7 @@ public:
             throw Stopped{};
         }
     }
-    /// @throws Stopped if the callback says so
+    /// @throws Stopped if the callback returns false
     void operator()(std::size_t done)
     {
         if (calls_++ % every_ != 0 || !*progress_) return;
@@ -142,8 +142,8 @@ private:
     std::uint64_t calls_ = 0;
 };
 
-/// The event surface of a system as its runs have met it; see `SurfaceProblem`. Times are counted
-/// in steps.
+/// The event surface of a system, sampled by the events of its runs; see `SurfaceProblem`. Times
+/// are counted in steps.
 template <class System, class X, class Method>
 class MetSurface {
 public:
@@ -151,7 +151,7 @@ public:
         double t;  ///< [s]
         X x;
         Mode mode;
-        double armed;  ///< 1 where the guard falls, -1 where it rises
+        double armed;  ///< 1 if the guard falls at the event, -1 if it rises
         double back;   ///< [steps] to the event before
     };
 
@@ -184,7 +184,7 @@ public:
     [[nodiscard]] const std::vector<Interval>& box() const noexcept { return box_; }
     void set_box(const std::vector<Interval>& box) { box_ = box; }
 
-    // --- as the sampler knows it ---
+    // --- the interface `SurfaceProblem` ---
 
     [[nodiscard]] State surface(Random& random) const
     {

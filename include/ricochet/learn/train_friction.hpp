@@ -51,7 +51,7 @@ struct FrictionTrainingOptions {
     /// Initial iterations by Adam, each on a few histories, before those of Levenberg-Marquardt.
     int adam_iterations = 0;
     double adam_rate = 3e-3;
-    const std::atomic<bool>* cancelled = nullptr;  ///< true ends the fit; its result is kept
+    const std::atomic<bool>* cancelled = nullptr;  ///< true ends the fit, which keeps its result
 };
 
 /// A fitted model of friction.
@@ -64,13 +64,13 @@ public:
     /// @throws std::invalid_argument for a history that `validate` refuses.
     [[nodiscard]] std::vector<double> friction(const FrictionHistory& history,
                                                int refine = 0) const;
-    /// The internal variables along it, one list for each.
+    /// The internal variables along a history, one list for each; throws as `friction`.
     [[nodiscard]] std::vector<std::vector<double>> internal(const FrictionHistory& history) const;
 
     /// Number of fitted parameters.
     [[nodiscard]] std::size_t parameters() const noexcept;
-    /// The pair of potentials, of an additive network with one internal variable; its
-    /// domain is that of the training.
+    /// The pair of potentials of an additive model with one internal variable, with the
+    /// domain of its training; empty for other models.
     [[nodiscard]] std::optional<AdditivePair> pair() const;
 
     double seconds = 0;  ///< [s] processor time of the training
@@ -92,7 +92,7 @@ private:
 [[nodiscard]] LearnedFriction train_friction(const std::vector<FrictionHistory>& histories,
                                              const FrictionTrainingOptions& options = {});
 
-/// Continues a fit with other histories, as in transfer learning.
+/// Continues a fit with other histories, as in transfer learning. @throws as `train_friction`.
 [[nodiscard]] LearnedFriction train_further(const LearnedFriction& from,
                                             const std::vector<FrictionHistory>& histories,
                                             const FrictionTrainingOptions& options);

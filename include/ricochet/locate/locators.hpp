@@ -18,7 +18,7 @@ struct Bisection {
 // Newton's method inside a bracket, with the slope from the flow: the default.
 //
 // The first guess is the root of the cubic through the guard and its rates at both
-// ends of the bracket. Once a sample is so near the root that the motion from there
+// ends of the bracket. Once a sample is so close to the root that the motion from there
 // is straight to the last bit, the root is extrapolated along the flow at that
 // sample, which costs no further step: the bracket closes around the root at the
 // price of guard calls alone, and does not widen with the rounding of a long step.

@@ -48,7 +48,7 @@ struct Certificate {
 /// Text of a certificate as it is stored in a model, one line of JSON; numbers keep their bits.
 [[nodiscard]] std::string to_text(const Certificate& certificate);
 
-/// @throws std::invalid_argument with one sentence if the text is no certificate.
+/// Reads a certificate from its text. @throws std::invalid_argument if it is not one.
 [[nodiscard]] Certificate parse_certificate(std::string_view text);
 
 /// Reason why the certificate of `model` does not hold for it, in words that follow "the

@@ -344,7 +344,7 @@ public:
         const std::size_t all = dimension();
         std::fill(d.begin(), d.end(), 0.0);
         for_each([&](const auto& set, std::size_t first, std::size_t n) {
-            // The block is computed where its rows will end up, and spread out from the last row.
+            // The block is computed contiguously; its rows are then moved apart, from the last one.
             const auto block = d.subspan(first * all, n * n);
             set.derivative(z.subspan(first, n), block);
             for (std::size_t i = n; i-- > 0;) {

@@ -37,8 +37,8 @@ concept KnowsInclusion = requires(const System& system)
     requires Inclusion<std::remove_cvref_t<decltype(system.set_valued())>>;
 };
 
-/// Events of the event-driven phases are the system's; in set-valued phases `Event::guard` is
-/// the reaction, and the modes are the one before the phase.
+/// Result of a run. In event-driven phases `Event::guard` is a guard of the system; in set-valued
+/// phases it is the index of a reaction, and both modes of the event are the mode before the phase.
 template <class X>
 struct MixedRun {
     Outcome outcome = Outcome::reached_end;
@@ -49,7 +49,7 @@ struct MixedRun {
     std::vector<Phase> phases;
     Trajectory<X> trajectory;  ///< at the sample times
     HandOverStatistics statistics;
-    StageReport failure;  ///< with `not_converged`
+    StageReport failure;  ///< set with `not_converged`
 };
 
 namespace detail {
@@ -64,8 +64,8 @@ template <class To, class From>
 }
 
 /// Whether a guard without a reset of the state switches within the resolution of the steps: 200
-/// crossings in a row between which it goes, on average, no farther than a thousand times the
-/// error of a step. Error control then decides how often it switches, not the motion.
+/// crossings in a row between which the guard moves, on average, at most a thousand times the
+/// error of a step. Error control then determines the number of switches, not the motion.
 class SwitchingWatch {
 public:
     /// Reviews the events recorded so far; `error` is the error of a step.
@@ -215,8 +215,8 @@ private:
         run_.outcome = done.outcome;
         if (done.outcome != Outcome::released) return true;
         if (!moved) {
-            // The inclusion finds nothing that would hold the motion back, and events do not lead
-            // on.
+            // The inclusion holds no reaction, and the event-driven run cannot continue from this
+            // state.
             run_.outcome = Outcome::not_handed_over;
             return true;
         }
@@ -274,7 +274,7 @@ private:
     MixedRun<X> run_;
 };
 
-/// Follows events first, and the inclusion where events do not lead on.
+/// Integrates by events as far as possible, and by the inclusion where events cannot continue.
 ///
 /// @throws std::invalid_argument as for other systems; also for `stop_at_event`,
 ///         `record_steps` and a backward run, which a hand-over does not support.

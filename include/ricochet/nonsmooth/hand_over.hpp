@@ -3,9 +3,9 @@
 //     event-driven   while every reaction is at a bound or held: an ordinary differential
 //                    equation (branch_modes.hpp), any explicit stepper, changes located to the
 //                    step map
-//     set-valued     where that ends: changes that coincide, reactions that y' = 0 does not
-//                    determine, switching that accumulates, and sets that have no such
-//                    branches at all. Bathe's steps, until the branches are plain again
+//     set-valued     where that is impossible: simultaneous changes, reactions that y' = 0 does
+//                    not determine, accumulating switches, and sets without such branches.
+//                    Bathe's steps, until the active set is determined again
 //
 // The reaction with which a phase starts is the minimal selection. Systems that declare no
 // inclusion include none of these headers.
@@ -73,7 +73,7 @@ template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
     return HandOver<System, Stepping>(system, w0, options).take();
 }
 
-/// A system that is no inclusion is refused with a sentence; never called.
+/// Rejects, with a sentence at compile time, a system that is not an inclusion; never called.
 template <class System, class... Stepping>
 requires(!Inclusion<System>)  //
     auto hand_over(const System& /*system*/, const detail::AnyStartGiven& /*w0*/,

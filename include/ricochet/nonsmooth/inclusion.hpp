@@ -6,7 +6,7 @@
 //
 //     -y in the normal cone of K at the reaction,
 //
-// so that the reaction opposes y with all that K allows, and takes the value in K that
+// so that the reaction minimises r . y over all r in K, and takes the value in K that
 // keeps y at zero if there is one: a relay, dry friction, a diode, a unilateral contact. If
 // `confines` is Confines::state instead, K is a set that y must not leave, and -reaction is in
 // the normal cone of K at y: stops, a saturated integrator.

@@ -25,13 +25,13 @@ namespace ricochet {
 enum class ErrorEstimate {
     none,      ///< sufficient for a `ConstantStep`
     embedded,  ///< `CompositeStep::embedded_error`: Bathe's scheme, averaged reaction
-    doubling,  ///< one step against two of half the length, the result of which is kept
+    doubling,  ///< one step against two of half the length, whose result is kept
 };
 
 /// How changes of branch inside a step are treated.
 enum class Switches {
     stepped_over,  ///< as in the source paper: of order 1 at a jump of the reaction
-    /// A step ends where a branch changes within it: at the last instant up to which the motion is
+    /// A step in which a branch changes ends at the last instant up to which the motion is
     /// consistent with the branches of its start. For boxes only.
     located,
 };
@@ -65,7 +65,7 @@ struct SetValuedOptions {
     std::uint64_t max_attempts = 100'000'000;
 };
 
-/// @throws std::invalid_argument naming the option, what was given and what was expected.
+/// Validates options. @throws std::invalid_argument naming the option, what was given and expected.
 void validate(const SetValuedOptions& options);
 
 /// Counts over one set-valued motion.
@@ -121,15 +121,15 @@ public:
     void next_step(double h) noexcept { h_ = h; }
     /// The scaled error of the last attempt.
     [[nodiscard]] double error() const noexcept { return scaled_error_; }
-    /// Counts, including those of a `LearnedStep`.
+    /// The step controller in its present state, with the counts of a `LearnedStep`.
     [[nodiscard]] const StepController& controller() const noexcept { return options_.controller; }
     [[nodiscard]] AnyStep<N, M>& stepper() noexcept { return step_; }
     [[nodiscard]] const Matrices& matrices() const noexcept { return step_.matrices(); }
     /// The branches of the state, which are kept if switches are located.
     [[nodiscard]] const Branches& branches() const noexcept { return start_branches_; }
-    /// Sets whether changes are located from now on, if the options ask for it.
+    /// Sets whether switches are located from now on; requires that the options ask for it.
     void locate_switches(bool locate) noexcept { locates_ = locate; }
-    /// The change that was located last.
+    /// The switch that was located last.
     struct Switch {
         std::size_t reaction = 0;
         Branch before = Branch::inside;
@@ -333,8 +333,8 @@ private:
         return report;
     }
 
-    /// A root of `function` between low and high, whose values have opposite signs: by the
-    /// Illinois variant of false position, halved if it stagnates. Zero without a root.
+    /// Finds a root of `function` between low and high, whose values have opposite signs, by the
+    /// Illinois variant of false position, halved if it stagnates. Zero if none exists.
     template <class Function>
     [[nodiscard]] static double find(double low, double at_low, double high, double at_high,
                                      double tolerance, const Function& function)
@@ -377,7 +377,7 @@ private:
         }
         ++statistics_.accepted;
         if (options_.switches == Switches::located) {
-            // Reactions that depend on one another can change places endlessly.
+            // Reactions that depend on one another can exchange branches endlessly.
             if (!switched_) {
                 short_switches_ = 0;
             } else if (now_.t - t < 0.1 * options_.step) {

@@ -93,8 +93,8 @@ struct ClassicStep {
 ///
 ///     factor = error^(-q / gamma1) error_before^(q / gamma2) (h / h_before)^-kappa
 ///
-/// rejected where that is below c1, and at most c2. With equal gammas only the ratio of
-/// two errors enters: nothing draws the error to 1, and with c1 = 1.8 a step is accepted
+/// rejected if that is below c1; limited to c2. With equal gammas only the ratio of
+/// two errors enters: nothing drives the error to 1, and with c1 = 1.8 a step is accepted
 /// only if the next may be nearly twice as long. It is included for comparison; use
 /// `FilteredStep`. A rejected step is cut to 0.6 at most, so that it cannot repeat
 /// forever.
@@ -204,9 +204,9 @@ template <class View>
     return std::visit([&](auto& rule) { return rule.judge(error, h); }, controller);
 }
 
-/// @throws std::invalid_argument for an order below 1, factors that do not shrink or grow,
-/// exponents that are not finite, a learned rule without a policy,
-/// or prescribed steps that are not positive.
+/// Validates the parameters of a controller.
+/// @throws std::invalid_argument for an order below 1, factors that do not shrink or grow, infinite
+/// or NaN exponents, a learned rule without a policy, or prescribed steps that are not positive.
 void validate(const StepController& controller);
 
 }  // namespace ricochet

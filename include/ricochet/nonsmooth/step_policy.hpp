@@ -5,9 +5,9 @@
 //
 // The classical proposal h 0.9 E^(-1/3) is multiplied by exp(network), held within [e^-2, e^2].
 // The inputs of the network are intensive, means over a field rather than sums, so that a
-// policy trained on one element serves any mesh. It decides only about lengths: whatever its
-// weights, a step that is too wrong is rejected and repeated by the classical rule, and inputs
-// outside of the range seen in training, or NaN, are left to that rule, too.
+// policy trained on one element serves any mesh. The policy decides only about lengths: whatever
+// its weights, a step whose error is too large is rejected and repeated by the classical rule. That
+// rule also decides where an input is NaN or outside of the range seen in training.
 #pragma once
 
 #include <array>
@@ -53,16 +53,16 @@ class StepPolicy {
 public:
     static constexpr std::string_view kind = "step-policy";
     static constexpr std::size_t inputs = StepRanges::inputs;
-    static constexpr double most = 2;  ///< of |log factor|
+    static constexpr double most = 2;  ///< largest |log factor|
 
-    /// @throws std::invalid_argument if the model is of another kind, or does not have that many
-    /// inputs and one output, or as `Mlp`.
+    /// @throws std::invalid_argument if the model is of another kind, if it does not have
+    /// `inputs` inputs and one output, or as `Mlp`.
     explicit StepPolicy(Model model);
 
-    /// @throws std::invalid_argument naming both if the policy is for another system or layout.
+    /// @throws std::invalid_argument if the policy is for another system or layout, naming both.
     void require(const StepLayout& layout) const;
 
-    /// log E, log tolerance, log step, fraction that switched, and the inputs of the system.
+    /// Returns log E, log tolerance, log step, the fraction switched, and the inputs of the system.
     [[nodiscard]] static StepRanges::Inputs inputs_of(double error, const StepView& view) noexcept;
 
     /// Factor for the classical proposal, in [e^-2, e^2]. Empty if an input is

@@ -44,15 +44,15 @@ struct TimeSteppingOptions {
     ContactOptions contacts{};
 };
 
-/// Validates the options. A run of no length is accepted.
+/// Validates the options. An empty interval of time is accepted.
 ///
 /// @throws std::invalid_argument naming the option.
 void validate(const TimeSteppingOptions& options);
 
 namespace detail {
 
-/// @throws std::invalid_argument naming the contact if a coefficient is out of range or the
-/// gap is below -`room` [m], or NaN.
+/// Validates a contact. @throws std::invalid_argument, naming the contact, if a coefficient is out
+/// of range, or if the gap is NaN or below -`room` [m].
 void check_contact(int contact, double restitution, double friction, double gap, double room);
 
 }  // namespace detail

@@ -1,12 +1,12 @@
 // Lasting contact of the bodies of a scene: stacks, sleeping bodies that lean on each other, chains
-// over an edge. It needs the contact solver and is a separate library, `ricochet::scene_contact`.
+// over an edge. Requires the contact solver; link the separate library `ricochet::scene_contact`.
 #pragma once
 
 #include "ricochet/scene/simulate.hpp"
 
 namespace ricochet {
 
-/// Groups of bodies in lasting contact advance by Moreau's steps of `SceneOptions::contact_step`:
+/// Solver of lasting contacts, by Moreau's time stepping with steps `SceneOptions::contact_step`:
 ///
 ///     simulate(scene, {.t_end = 10, .contacts = scene_contacts()})
 ///

@@ -10,22 +10,22 @@
 
 namespace ricochet {
 
-/// Thrown for a scene's text that is refused; one sentence that begins with its name and line:
+/// Error in the text of a scene. The message is one sentence that begins with file and line:
 /// "bin.json:12: expected a number for "radius", found "big"".
 class SceneFileError : public std::runtime_error {
 public:
     using std::runtime_error::runtime_error;
 };
 
-/// A scene and the options of its run, as a file has them.
+/// A scene and the options of its run, as read from a file.
 struct SceneFile {
     Scene scene;
-    SceneOptions options;  ///< from "run"; t_end is NaN where it is not given
+    SceneOptions options;  ///< from "run"; t_end is NaN if it is not given
 };
 
 /// Reads the scene that `text` describes (docs/scenes.md lists the keys). Error messages name the
 /// text `file`.
-/// @throws SceneFileError
+/// @throws SceneFileError if `text` is not JSON, or is not a valid scene.
 [[nodiscard]] SceneFile read_scene(std::string_view text, std::string_view file = "scene");
 
 /// Reads a scene from a file. @throws SceneFileError also if the file cannot be read.

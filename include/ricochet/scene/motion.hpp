@@ -1,8 +1,8 @@
-// Given motions of surfaces: translations as functions of time, with bounds by which a run proves
-// that no earlier contact exists.
+// Prescribed motions of surfaces: translations as functions of time, with bounds from which a run
+// proves that it misses no contact.
 //
-// A surface is translated, without rotation, from its described position. Bodies that it meets are
-// pushed with its velocity; no body moves a surface.
+// A surface is translated, without rotation, from the position in its description. It pushes the
+// bodies that it meets; bodies do not affect its motion.
 #pragma once
 
 #include <array>
@@ -23,10 +23,10 @@ struct Oscillation {
     double phase = 0;                   ///< [rad]
 };
 
-/// displacement(t) = velocity (t - since), from the beginning of time on
+/// displacement(t) = velocity (t - since) for all t, including t < since
 struct ConstantVelocity {
     std::array<double, 2> velocity{};  ///< [m/s]
-    double since = 0;                  ///< [s] when the surface is where it is described
+    double since = 0;                  ///< [s] time of zero displacement
 };
 
 /// Linear interpolation between displacements at given times; at rest before the first and after
@@ -36,15 +36,15 @@ struct PiecewiseLinear {
     std::vector<std::array<double, 2>> displacements{};  ///< [m] one for each time
 };
 
-/// A motion by functions without side effects. The velocity must be the derivative of the
-/// displacement and continuous. A bound that is found broken between two evaluations ends the run
-/// as `Outcome::wrong_bound`; one that is broken unseen may lose a contact.
+/// Motion given by functions without side effects. The velocity must be the derivative of the
+/// displacement and continuous. If a bound is found to be violated between two evaluations, the run
+/// ends with `Outcome::wrong_bound`; a violation that is not detected may cause a missed contact.
 struct GivenMotion {
     std::function<std::array<double, 2>(double t)> displacement{};         ///< [m]
     std::function<std::array<double, 2>(double t)> velocity{};             ///< [m/s]
     double acceleration_bound = std::numeric_limits<double>::quiet_NaN();  ///< [m/s^2] required
-    double speed_bound = std::numeric_limits<double>::infinity();          ///< [m/s] saves work
-    double reach = std::numeric_limits<double>::infinity();  ///< [m] |displacement|, saves work
+    double speed_bound = std::numeric_limits<double>::infinity();          ///< [m/s] optional
+    double reach = std::numeric_limits<double>::infinity();  ///< [m] of |displacement|, optional
 };
 
 using SurfaceMotion =

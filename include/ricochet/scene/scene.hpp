@@ -1,7 +1,7 @@
 // Contents of a scene: discs and points, walls and terrain, springs, gravity and drag.
 //
-// A `Scene` describes and checks; `simulate` (scene/simulate.hpp) runs it. Whether the plane is
-// vertical or horizontal depends on gravity. Discs do not turn: friction acts on their centres.
+// A `Scene` holds and validates the description; `simulate` (scene/simulate.hpp) runs it. The plane
+// is vertical with gravity, horizontal without. Discs do not spin: friction acts at their centres.
 #pragma once
 
 #include <array>
@@ -57,7 +57,7 @@ struct Material {
 
 /// A disc without spin.
 struct Disc {
-    std::string name{};  ///< may be empty: then it is called by its number
+    std::string name{};  ///< if empty, the disc is called by its number
     Vector2 at{};        ///< [m] centre
     Vector2 velocity{};  ///< [m/s]
     double radius = 1;   ///< [m], positive
@@ -89,12 +89,12 @@ struct Wall {
 struct Terrain {
     std::string name{};
     std::vector<Vector2> points{};  ///< [m] two or more
-    bool closed = false;            ///< whether the last is joined to the first
+    bool closed = false;            ///< whether the last point is joined to the first
     MaterialId material{};
-    SurfaceMotion motion{};  ///< discs alone can meet terrain that moves
+    SurfaceMotion motion{};  ///< if it moves, only discs meet it, not points
 };
 
-/// Between the centres of two bodies: pulls with stiffness (length - rest) + damping d(length)/dt.
+/// A spring between two centres, with tension stiffness (length - rest) + damping d(length)/dt.
 struct Spring {
     std::array<BodyId, 2> between{};
     double rest = 0;       ///< [m] length without force
@@ -102,9 +102,9 @@ struct Spring {
     double damping = 0;    ///< [N s/m]
 };
 
-/// A hybrid system whose discs others can meet. It meets no surfaces: its guards are its own.
+/// A hybrid system whose discs other bodies can hit. Surfaces do not affect it, only its guards.
 struct SystemBody {
-    std::string name{};  ///< its discs are called by it: "arm", or "arm 0" and "arm 1"
+    std::string name{};  ///< its discs are named after it: "arm", or "arm 0" and "arm 1"
     std::shared_ptr<const detail::SceneSystem> motion{};  ///< `system_body(system, x0)`
     MaterialId material{};
 };
@@ -119,14 +119,14 @@ public:
     };
 
     Scene() : Scene(Settings{}) {}
-    /// @throws std::invalid_argument where gravity is not finite.
+    /// @throws std::invalid_argument if a setting is outside its range.
     explicit Scene(const Settings& settings);
 
-    /// Adds a part to the scene. Each part is checked when it is added, and refused with a sentence
-    /// that names it: for a mass or radius that is not positive, a value that is not finite, a name
-    /// in use, an unknown handle, a restitution above 1, or a body that lies behind a wall or
-    /// across terrain that was added before.
-    /// @throws std::invalid_argument
+    /// Adds a part to the scene and returns its handle, if it has one.
+    /// @throws std::invalid_argument, with a message that names the part, for a mass or radius that
+    /// is not positive, a value that is not finite, a name in use, an unknown handle, a restitution
+    /// outside [0, 1], or a body that lies behind a wall or across terrain added before, unless
+    /// that surface moves.
     MaterialId material(const Material& material);
     BodyId disc(const Disc& disc);
     BodyId point(const Point& point);
@@ -135,12 +135,12 @@ public:
     void spring(const Spring& spring);
     SystemId system(const SystemBody& system);
 
-    /// Refuses `bodies` more bodies where they would need more memory than is allowed.
+    /// @throws std::invalid_argument if `bodies` more bodies would exceed the memory limit.
     void require_room(double bodies) const;
 
-    /// Refuses bodies that overlap at the start, naming both and the overlap, and bodies that lie,
-    /// at `t_start` [s], behind walls or across terrain. Called by `simulate` and `explain`.
-    /// @throws std::invalid_argument
+    /// Validates the positions of the bodies at `t_start` [s]; called by `simulate` and `explain`.
+    /// @throws std::invalid_argument for bodies that overlap, naming both and the overlap, and for
+    /// bodies that lie behind walls or across terrain.
     void check(double t_start = 0) const;
 
     [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
@@ -149,7 +149,7 @@ public:
     [[nodiscard]] std::span<const Material> materials() const noexcept { return materials_; }
     [[nodiscard]] std::span<const Spring> springs() const noexcept { return springs_; }
 
-    /// Systems; their discs are among the bodies, where their mass has no meaning.
+    /// A system. Its discs are among `bodies()`; the mass given there has no meaning.
     struct System {
         std::shared_ptr<const detail::SceneSystem> motion;
         std::uint32_t first = 0;  ///< index of its first disc
@@ -159,11 +159,11 @@ public:
     /// The system that a body is a disc of; null for any other body.
     [[nodiscard]] const System* system_of(std::uint32_t body) const noexcept;
 
-    /// Walls first, then terrain, each in the order in which it came.
+    /// A wall, or a terrain. Both kinds are in one list, in the order of their addition.
     struct Surface {
         std::string name;
         bool is_wall = true;
-        std::vector<Vector2> points;  ///< of a wall its one point; closed terrain repeats the first
+        std::vector<Vector2> points;  ///< one for a wall; closed terrain repeats the first
         Vector2 normal{};             ///< of a wall, of length 1
         MaterialId material{};
         SurfaceMotion motion{};
@@ -176,7 +176,7 @@ public:
     /// The body of this name. @throws std::invalid_argument with the nearest name that is known.
     [[nodiscard]] BodyId body(std::string_view name) const;
 
-    /// [bytes] What a run needs, without events and samples.
+    /// Memory [bytes] that a run needs, apart from events and samples.
     [[nodiscard]] double memory() const noexcept;
 
 private:

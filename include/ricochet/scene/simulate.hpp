@@ -16,7 +16,7 @@ namespace ricochet {
 
 /// Rule for several contacts of one cluster that are struck at one instant.
 enum class ImpactLaw {
-    waves,     ///< the fastest approaching first, ties together; repeated until none approaches
+    waves,     ///< fastest approaching contacts first, ties together, until none approaches
     together,  ///< Newton's law for all contacts at once
 };
 
@@ -31,20 +31,20 @@ struct SceneOptions {
     double atol = 1e-10;
     ImpactLaw impacts = ImpactLaw::waves;
 
-    /// [s] A change of the model, off at 0: an impact is elastic where one of its bodies had its
-    /// last one less than this ago (S. Luding and S. McNamara, How to handle the inelastic collapse
-    /// of a dissipative hard-sphere gas with the TC model, Granular Matter 1, 1998).
+    /// [s] Contact time of the TC model; 0: off. An impact is elastic if one of its bodies had an
+    /// impact less than this long ago (S. Luding and S. McNamara, How to handle the inelastic
+    /// collapse of a dissipative hard-sphere gas with the TC model, Granular Matter 1, 1998).
     double elastic_within = 0;
 
     /// `scene_contacts()` of `ricochet::scene_contact`. Without it a run ends with `Outcome::zeno`
     /// where bodies stay in contact with each other.
     const SceneContacts* contacts = nullptr;
-    double contact_step = 1e-3;  ///< [s] of groups in lasting contact, whose order is 1
+    double contact_step = 1e-3;  ///< [s] step of groups in lasting contact; order 1
 
     bool record_events = true;           ///< off: events are counted, not kept
     std::vector<double> sample_times{};  ///< [s] ascending; they do not affect the motion
     std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();
-    const std::atomic<bool>* cancelled = nullptr;  ///< set from elsewhere, ends the run
+    const std::atomic<bool>* cancelled = nullptr;  ///< set by another thread to end the run
 };
 
 /// The second body, or the surface, of an event.
@@ -60,10 +60,10 @@ struct SceneEvent {
     /// Kinds of events.
     enum class Kind : std::uint8_t {
         impact,
-        held,      ///< impacts on the surface have accumulated: it slides on it, or is at rest
+        held,      ///< impacts on the surface have accumulated: the body slides or rests on it
         stopped,   ///< friction has stopped a sliding body
         joined,    ///< lasting contact: the body is advanced in a group; `other` is the body itself
-        released,  ///< it has left its group, or its group contact
+        released,  ///< the body has left its group
         slept,     ///< the group of the body has come to rest
     };
     double t = 0;  ///< [s]
@@ -88,19 +88,19 @@ struct SceneStatistics {
     std::uint64_t impacts = 0;      ///< contacts with an impact
     std::uint64_t events = 0;       ///< events; the impacts of one cluster count once
     std::uint64_t waves = 0;        ///< waves of impacts in clusters
-    std::uint64_t collapses = 0;    ///< clusters whose restitution was spent
+    std::uint64_t collapses = 0;    ///< clusters whose impacts accumulated
     std::uint64_t predictions = 0;  ///< searches for a first contact, of pairs and surfaces
     std::uint64_t stale = 0;        ///< predicted impacts that did not happen
     std::uint64_t crossings = 0;    ///< from cell to cell
-    std::uint64_t steps = 0;        ///< of islands with springs or drag
+    std::uint64_t steps = 0;        ///< steps of islands with springs or drag
     std::uint64_t rejected = 0;
     std::uint64_t flow_calls = 0;
     std::uint64_t joins = 0;          ///< hand-overs of bodies to groups in lasting contact
-    std::uint64_t contact_steps = 0;  ///< of such groups
-    double contact_defect = 0;        ///< largest of their contact laws, as a fraction of the
-                                      ///< velocities: 1e-10, or 1e-7 where bodies are wedged
-    std::uint64_t alone = 0;          ///< bodies that could meet no other, and had no calendar
-    std::uint64_t groups = 0;         ///< of bodies that could meet
+    std::uint64_t contact_steps = 0;  ///< steps of such groups
+    double contact_defect = 0;        ///< largest residual of their contact law, relative to the
+                                      ///< velocities: 1e-10, or 1e-7 if bodies are wedged
+    std::uint64_t alone = 0;          ///< bodies that could meet no other body
+    std::uint64_t groups = 0;         ///< groups of bodies that could meet
 };
 
 /// Result of a run. Nothing that was computed is lost, whatever the outcome.
@@ -108,12 +108,12 @@ struct SceneRun {
     Outcome outcome = Outcome::reached_end;
     std::string message;  ///< empty at the end, otherwise a sentence on what ended the run
     std::vector<std::uint32_t> involved;          ///< bodies that the message is about
-    double t = 0;                                 ///< [s] time reached, by all bodies
+    double t = 0;                                 ///< [s] time reached by all bodies
     std::vector<BodyState> bodies;                ///< at that time
     std::vector<std::vector<double>> systems;     ///< states of systems at that time
     std::vector<SceneEvent> events;               ///< in the order of time
-    std::vector<double> sample_times;             ///< those reached
-    std::vector<std::vector<BodyState>> samples;  ///< a row for each
+    std::vector<double> sample_times;             ///< the sample times reached
+    std::vector<std::vector<BodyState>> samples;  ///< one row per sample time
     SceneStatistics statistics;
 };
 
@@ -121,13 +121,13 @@ struct SceneRun {
 /// @throws std::invalid_argument for an invalid scene or option.
 [[nodiscard]] SceneRun simulate(const Scene& scene, const SceneOptions& options);
 
-/// Description of how the scene would be run: islands and their motion, which bodies can meet and
-/// when first, what is skipped and why, memory. Nothing is simulated.
-/// @throws as `simulate`
+/// Describes, in text, how the scene would be run: islands and their motion, which bodies can meet
+/// and when they first do, which tests are skipped and why, and memory. Simulates nothing.
+/// @throws std::invalid_argument as `simulate`.
 [[nodiscard]] std::string explain(const Scene& scene, const SceneOptions& options);
 
-/// Kinetic energy, and potential energy of gravity and springs [J]; of bodies that are not part of
-/// systems.
+/// Energy [J] of the bodies that are not part of systems: kinetic, and potential of gravity and
+/// springs. `bodies` holds one state for each body of the scene.
 [[nodiscard]] double energy(const Scene& scene, const std::vector<BodyState>& bodies);
 
 }  // namespace ricochet

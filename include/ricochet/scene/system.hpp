@@ -1,15 +1,15 @@
-// Hybrid systems as bodies of a scene: a pendulum, an arm, whatever has a flow and, if it likes,
-// guards and resets (hybrid/system.hpp). Others meet its discs. Besides its flow it declares
+// Hybrid systems as bodies of a scene, such as a pendulum or an arm: a flow, optional guards and
+// resets (hybrid/system.hpp), and discs that other bodies can hit. Besides its flow it declares
 //
 //     shape_count                       number of its discs, a constant or a member
 //     shape_radius(k)                   [m] of disc k
 //     shape(k, t, x)                    SystemDisc: centre [m] and its velocity [m/s]
-//     shape_acceleration(k, t, x)       [m/s^2] no acceleration of this centre is above it from
-//                                       here on, until the next event or push
-//     push(k, t, x, impulse)            x- becomes x+, in place, where disc k is pushed at its
-//                                       centre by an impulse [N s]; linear in the impulse
+//     shape_acceleration(k, t, x)       [m/s^2] upper bound of the acceleration of its centre
+//                                       from (t, x) until the next event or push
+//     push(k, t, x, impulse)            applies an impulse [N s] at the centre of disc k, which
+//                                       changes x in place, linearly in the impulse
 //
-// A system with modes may take the mode before t in the last three of them.
+// In a system with modes, the last three may take the mode as an argument before t.
 //
 // Between impacts the system is integrated as in a run of its own, by steps of dopri5, with events
 // found by an `EventMonitor`. First contacts of its discs are located on the method's own map, and
@@ -135,7 +135,7 @@ private:
 
 }  // namespace detail
 
-/// Makes a system with its initial state for `Scene::system`; keeps copies of both.
+/// Returns copies of a system and its initial state in the form that `SystemBody::motion` takes.
 template <class System, class X>
 requires Flowing<System, X> && StateVector<X>
 [[nodiscard]] std::shared_ptr<const detail::SceneSystem> system_body(const System& system,

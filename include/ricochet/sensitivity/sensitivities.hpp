@@ -23,7 +23,7 @@ namespace ricochet {
 
 /// Derivatives of one event, one column for each direction. NaN if they do not exist.
 struct EventSensitivity {
-    Eigen::VectorXd dt;        ///< of its time [s]
+    Eigen::VectorXd dt;        ///< derivatives of its time [s]
     Eigen::MatrixXd before;    ///< S⁻: of the state, at the fixed time of the event
     Eigen::MatrixXd after;     ///< S⁺: of the state after it
     Eigen::MatrixXd at_event;  ///< of the state before the reset, at the moving time of the
@@ -116,7 +116,7 @@ private:
         }
     }
 
-    /// Names the conflict of contradictory resets, which the variational system answers with NaN.
+    /// Finds the resets that contradict each other, for which the variational system returns NaN.
     void name_conflict()
     {
         if constexpr (Resetting<System, X>) {
@@ -161,8 +161,8 @@ private:
         }
     }
 
-    /// The derivatives end at an event that is marked so, and at a touch of a guard that
-    /// resets: some neighbours of the motion cross there.
+    /// Ends the derivatives at an event that is marked as undefined, and at a touch of a guard with
+    /// a reset: some neighbouring motions cross there.
     void note_undefined(std::size_t k)
     {
         if (result_.undefined_at || variational_.columns() == 0) return;
@@ -205,7 +205,7 @@ private:
         return time.undefined == Undefined::no ? time.dt : undefined_time();
     }
 
-    /// A state at the time of an event is the one after it.
+    /// Derivatives in the state y at time t; at the time of an event, those after it.
     [[nodiscard]] Eigen::MatrixXd derivatives_at(const Flat& y, double t) const
     {
         bool defined = true;

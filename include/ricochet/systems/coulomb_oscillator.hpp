@@ -17,7 +17,7 @@ namespace ricochet {
 ///     reset   stick where stiffness |u| <= static_friction, else turn back
 ///
 /// Known solution: half a cosine between turning points, so that the turns are at
-/// multiples of pi sqrt(mass / stiffness), each 2 friction / stiffness nearer than the
+/// multiples of pi sqrt(mass / stiffness), each 2 friction / stiffness nearer to zero than the
 /// one before; see `turning_time` and `turning_point`. By default, from u = 2, they are
 /// at u = -1.4, 0.8 and -0.2, where the mass sticks.
 class CoulombOscillator : public FrictionOscillator {
@@ -26,7 +26,7 @@ public:
         double mass = 1;               ///< [kg], positive
         double stiffness = 1;          ///< [N/m], positive
         double friction = 0.3;         ///< [N] while slipping, zero or positive
-        double static_friction = 0.3;  ///< [N] that sticking bears, at least `friction`
+        double static_friction = 0.3;  ///< [N] largest force while sticking, at least `friction`
     };
 
     constexpr CoulombOscillator()
@@ -46,18 +46,18 @@ public:
     /// Time [s] of the n-th stop after a start at rest, n = 1, 2, ...
     [[nodiscard]] double turning_time(int n) const noexcept;
 
-    /// Where [m] the n-th stop is after a start at rest at u = `from` [m] > 0, as long as
-    /// none of those before it sticks.
+    /// Position [m] of the n-th stop after a start at rest at u = `from` [m] > 0, if the mass
+    /// sticks at none of the stops before it.
     [[nodiscard]] double turning_point(int n, double from = start[0]) const noexcept;
 
-    /// The number of stops from u = `from` [m] > 0, the last of which sticks; zero from a
-    /// start that sticks at once, the largest integer if it never does.
+    /// The number of stops from u = `from` [m] > 0, the last of which sticks; zero if the mass
+    /// sticks at the start, the largest integer if it never does.
     [[nodiscard]] int stops(double from = start[0]) const noexcept;
 
 private:
     double half_period_ = std::numbers::pi;        ///< [s]
-    double loss_ = 2 * Parameters{}.friction;      ///< of amplitude at each turn [m]
-    double reach_ = Parameters{}.static_friction;  ///< [m] within which it sticks
+    double loss_ = 2 * Parameters{}.friction;      ///< [m] amplitude lost at each turn
+    double reach_ = Parameters{}.static_friction;  ///< [m] largest |u| at which it sticks
 };
 
 }  // namespace ricochet

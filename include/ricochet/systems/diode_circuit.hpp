@@ -22,7 +22,7 @@ namespace ricochet {
 /// (D. M. Riley and others, Reinforcement Learning-based adaptive time-integration for
 /// nonsmooth dynamics, section 5.2; the value of `current` is that of their code.)
 ///
-/// The solution is piecewise that of a linear system.
+/// Between switches the solution is that of a linear system.
 class DiodeCircuit {
 public:
     struct Parameters {

@@ -25,7 +25,7 @@ enum class FrictionLaw {
 ///     u' = v
 ///     mass v' = -stiffness u + r,     r in [-F(|y|), F(|y|)] against y
 ///
-/// Friction in sticking reaches up to F(0); there is no larger static friction.
+/// Sticking friction is at most F(0): there is no larger static friction.
 class FrictionInclusion {
 public:
     struct Parameters {
@@ -41,8 +41,8 @@ public:
     FrictionInclusion() = default;
     /// @throws std::invalid_argument if a parameter is outside its range.
     explicit FrictionInclusion(const Parameters& parameters);
-    /// An inclusion with the parameters of `oscillator`.
-    /// @throws std::invalid_argument also if its static friction differs from the kinetic.
+    /// The inclusion that describes a `FrictionOscillator` with these parameters.
+    /// @throws std::invalid_argument also if the static friction differs from the kinetic.
     [[nodiscard]] static FrictionInclusion of(const FrictionOscillator::Parameters& parameters);
 
     static constexpr std::string_view name = "friction-inclusion";

@@ -13,7 +13,7 @@ namespace ricochet {
 ///
 ///     w' = amplitude sin(frequency t) + r,     r in -gain Sgn(w)
 ///
-/// With gain > amplitude it reaches w = 0 in finite time and stays there, r balancing the
+/// With gain > amplitude w reaches 0 in finite time and stays there, r balancing the
 /// disturbance. (D. M. Riley and others, Reinforcement Learning-based adaptive
 /// time-integration for nonsmooth dynamics, section 5.1.)
 ///
@@ -62,8 +62,8 @@ public:
     /// w(t) from w(0) = `from` > 0, for gain > amplitude.
     [[nodiscard]] double exact(double t, double from) const noexcept;
 
-    /// When w(0) = `from` > 0 first vanishes, for gain > amplitude; to neighbouring doubles
-    /// of the closed form.
+    /// Time [s] at which w first vanishes from w(0) = `from` > 0, for gain > amplitude, exact to
+    /// neighbouring doubles of the closed form.
     [[nodiscard]] double reaching_time(double from) const noexcept;
 
     static constexpr double start = 0.15;  ///< [-]

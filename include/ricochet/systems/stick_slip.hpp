@@ -11,14 +11,14 @@ namespace ricochet {
 /// with the sliding speed.
 ///
 /// A `FrictionOscillator` with, by default, unit mass and stiffness on a belt of speed
-/// 0.2 and the friction 1 / (1 + 3 s), which sticking bears up to its value at s = 0.
+/// 0.2 and the friction 1 / (1 + 3 s); sticking holds up to its value at s = 0.
 ///
 /// (R. I. Leine, D. H. van Campen, A. de Kraker and L. van den Steen, Stick-slip
 /// vibrations induced by alternate friction models, Nonlinear Dynamics 16, 1998, pages
 /// 41 to 54.)
 ///
 /// Known solution: from `start`, the onset of slip, the mass slips back and sticks again
-/// at `stick_time`; the belt carries it to the start, at `period`. Sticking takes
+/// at `stick_time`; the belt carries it back to `start` by the time `period`. Sticking takes
 /// (1 - stick_position) / 0.2.
 class StickSlip : public FrictionOscillator {
 public:
@@ -42,7 +42,7 @@ public:
     static constexpr State start{1, 0.2};
     static constexpr Mode start_mode = slip_left;
 
-    /// With the default parameters: Taylor series of high order in arithmetic of 34
+    /// Values for the default parameters, by Taylor series of high order in arithmetic of 34
     /// digits or more, checked against half the step.
     static constexpr double stick_time = 4.2959995254801548834;     ///< [s]
     static constexpr double stick_position = -0.54100635387008475;  ///< [m]

@@ -34,10 +34,10 @@ public:
 
     struct Parameters {
         double rate = 0.1;   ///< [1/s], positive
-        double ambient = 0;  ///< [degrees], what the room cools to; below low
-        double heated = 30;  ///< [degrees], what it warms to; above high
-        double low = 18;     ///< [degrees], where the heater is switched on
-        double high = 22;    ///< [degrees], where it is switched off; above low
+        double ambient = 0;  ///< [degrees], limit with the heater off; below low
+        double heated = 30;  ///< [degrees], limit with the heater on; above high
+        double low = 18;     ///< [degrees] at which the heater is switched on
+        double high = 22;    ///< [degrees] at which it is switched off; above low
     };
 
     constexpr Thermostat() = default;

@@ -7,10 +7,10 @@
 
 namespace ricochet {
 
-/// q = (x, height z of the centre above its height at rest, tilt), small tilts.
+/// A block with q = (x, height z of the centre above its height at rest, tilt), for small tilts.
 ///
-/// Pushed off at speed v0 it slides for v0 / (friction g) over v0^2 / (2 friction g) and
-/// rests, its weight shifted to the front corner:
+/// Pushed at speed v0 it slides for the time v0 / (friction g) over v0^2 / (2 friction g), and
+/// rests with its weight shifted to the front corner:
 ///
 ///     m g (1/2 +- friction half_height / (2 half_width)),
 ///

@@ -41,8 +41,8 @@ struct Woodpecker {
     double coefficient = 0.3;       ///< of friction, at all contacts
     double beak_restitution = 0.5;
 
-    /// The sleeve's lower edge on the pole; the source's angle of -0.1036 has it a micrometre
-    /// inside.
+    /// State with the sleeve's lower edge on the pole; at the source's angle of -0.1036 it would be
+    /// a micrometre inside.
     [[nodiscard]] static Vector start() { return {0, -0.0006 / 0.0058 * (1 - 1e-12), -0.2788}; }
     [[nodiscard]] static Vector start_velocity() { return {-0.3411, 0, -7.4583}; }
 

@@ -101,7 +101,7 @@ private:
     double next_ = 2;  ///< [s]
 };
 
-/// A share in progress.
+/// The execution of one process's share of the rows.
 class ShareRun {
 public:
     ShareRun(const EnsembleRuns& runs, const Share& share, const fs::path& directory)

@@ -65,7 +65,7 @@ private:
     double next_ = patience;  // [s]
 };
 
-/// The same options, with the progress shown.
+/// Returns the options with a callback that shows the progress.
 [[nodiscard]] inline RuptureOptions shown(RuptureOptions options, LongRun& progress,
                                           std::string label)
 {

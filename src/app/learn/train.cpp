@@ -84,7 +84,7 @@ auto run_training(const Train& train, const TrainingRequest& request,
         if (request.resume && !started) throw BadInput(error.what());
         throw;
     } catch (const std::invalid_argument& error) {
-        // Only the samples have shown this: the training fails, the input is not refused.
+        // This is known only after sampling: the training fails, and the input is not refused.
         if (samples) throw std::runtime_error(error.what());
         throw;
     }

@@ -36,8 +36,8 @@ private:
 
 /// A system at a door of its own, whose functions may be called without the interpreter.
 ///
-/// What it does not have is neutral: resets that change nothing, times that never come. Whether
-/// guards have resets is in their `guard_info`.
+/// Absent functions have neutral defaults: resets that change nothing, time events that never
+/// come. `guard_info` tells whether a guard has a reset.
 class DoorSystem {
 public:
     static constexpr bool unchecked_names = true;

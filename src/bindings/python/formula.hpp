@@ -50,8 +50,8 @@ class Formula {
 public:
     /// @param ops      for each operation: name, first and second operand, value of a constant
     /// @param outputs  indices of the operations that are the results
-    /// @throws std::invalid_argument for an unknown name, or an operand that is not an earlier
-    /// operation
+    /// @throws std::invalid_argument for an unknown name, or for an operand that does not refer to
+    /// an earlier operation
     Formula(std::size_t components,
             const std::vector<std::tuple<std::string, std::size_t, std::size_t, double>>& ops,
             std::vector<std::size_t> outputs);

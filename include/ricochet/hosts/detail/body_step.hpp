@@ -10,11 +10,11 @@
 
 namespace ricochet::hosts::detail {
 
-/// The state is x = (position [m], velocity [m/s]) of the body's centre, 6 components. Rates are
-/// those of the engine's map, x' = v(s) + s a, which is what the body follows.
+/// Host with the state x = (position [m], velocity [m/s]) of the body's centre, 6 components. Rates
+/// belong to the engine's map, x' = v(s) + s a, which the body follows.
 ///
-/// An engine has a `Body`, its whole state, with the six of them as `x`; and read(), write(body),
-/// advance(s), gravity(i).
+/// An engine has a type `Body` for the whole state of the body, with these six components in `x`,
+/// and the functions read(), write(body), advance(s) and gravity(i).
 template <class Engine>
 class BodyStep : public StepEnds {
 public:
@@ -64,7 +64,7 @@ public:
         }
     }
 
-    /// Continues the rest of the body's state to t. The rate is that of free fall.
+    /// Moves the rest of the body's state to t, and sets x. The rate is that of free fall.
     void go_on_from(double t, std::span<const double> x, bool /*changed*/)
     {
         if (t < t1_) {

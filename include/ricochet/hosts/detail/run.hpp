@@ -1,4 +1,4 @@
-// Internal: what it declares may change without notice.
+// Internal: the declarations of this header may change without notice.
 //
 // The loop of a host and a monitor, for the adapters in this directory.
 //
@@ -9,7 +9,7 @@
 //     step(t_stop)         takes a step that does not pass t_stop
 //     go_on_from(t, x, changed)
 //                          goes to time t in its last step, or after it, with the state x;
-//                          `changed`: which its motion so far does not lead to, or another mode
+//                          `changed`: its motion so far does not lead to x, or the mode is new
 #pragma once
 
 #include <algorithm>
@@ -20,7 +20,7 @@
 
 namespace ricochet::hosts {
 
-/// Moves `host` from where it is to t_end, through all events; `at_cut` is called with every cut,
+/// Moves `host` from its current time to t_end, through all events; calls `at_cut` with every cut
 /// before the host continues from it.
 /// @return `stands` at t_end, `rests` there, or `ended`; `monitor.outcome()` says why
 template <class Host, class Monitor, class AtCut>
@@ -32,14 +32,14 @@ Verdict run(Host& host, Monitor& monitor, double t_end, const AtCut& at_cut, Mod
             at_cut(cut);
             host.go_on_from(cut.t.value, cut.after,
                             cut.state_changed || cut.mode_after != cut.mode_before);
-            // A host of single precision has rounded it.
+            // A host in single precision has rounded the state.
             verdict = std::ranges::equal(host.x(), cut.after)
                           ? monitor.resume(host.rate(), host.scale())
                           : monitor.resume(host.x(), cut.mode_after, host.rate(), host.scale());
         }
         return verdict;
     };
-    // Closer to its end a method has no room for a step.
+    // Nearer to t_end than this a method cannot take a step.
     const double rounding = 8 * std::numeric_limits<double>::epsilon() * std::fabs(t_end);
     Verdict verdict = settled(monitor.start({host.t()}, host.x(), host.rate(), host.scale(), mode));
     while (verdict != Verdict::ended && t_end - host.t() > rounding) {

@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// What the integrators of SUNDIALS have in common: steps taken one by one, with dense output.
+// The common part of the hosts for SUNDIALS: steps taken one by one, with dense output.
 #pragma once
 
 #include <sundials/sundials_nvector.h>
@@ -20,13 +20,13 @@ namespace ricochet::hosts::detail {
 
 static_assert(std::is_same_v<realtype, double>, "ricochet: SUNDIALS computes in another precision");
 
-/// `Calls` are those of the integrator: set_stop(t), evolve(t_stop, t, x), dky(t, k, x), reinit(t,
-/// x), and rate(t, x, dxdt), which return flags; and order(), of its dense output in the last step,
-/// if it varies.
+/// Host for an integrator of SUNDIALS. `Calls` has its functions set_stop(t), evolve(t_stop, t, x),
+/// dky(t, k, x), reinit(t, x) and rate(t, x, dxdt), which return flags, and, if it varies, order(),
+/// the order of the dense output in the last step.
 template <class Calls>
 class SundialsHost : public StepEnds {
 public:
-    /// Initialises the integrator once more, at (t, x).
+    /// Initialises the integrator again, at (t, x).
     /// @param scale  [s] length of the first step, roughly
     SundialsHost(Calls calls, double t, N_Vector x, double scale)
         : StepEnds(t, {N_VGetArrayPointer(x), static_cast<std::size_t>(N_VGetLength(x))}, scale),
@@ -37,7 +37,7 @@ public:
         go_on_from(t, x1_, true);
     }
 
-    /// Takes a step, or after a cut that has changed nothing shows what is left of the last one.
+    /// Takes a step or, after a cut that has changed nothing, shows the rest of the last one.
     void step(double t_stop)
     {
         begin_step();
@@ -57,8 +57,8 @@ public:
         require(calls_.dky(t1_, 1, view(x_, rate1_)));
     }
 
-    /// The dense output where it is of a higher order than the cubic through both ends; and that
-    /// in the first step, which is so short that t0 + s loses much by rounding.
+    /// The state at offset s by the dense output, or by the cubic through both ends where the dense
+    /// output has no higher order and in the first step, so short that t0 + s loses last digits.
     void interpolate(double s, std::span<double> x) const
     {
         cubic_ ? cubic().interpolate(s, x) : output(s, 0, x);
@@ -68,7 +68,7 @@ public:
         cubic_ ? cubic().interpolate_rate(s, dxdt) : output(s, 1, dxdt);
     }
 
-    /// The method starts again only where something has changed.
+    /// Continues from x at time t. The integrator is initialised again only if `changed`.
     /// @throws std::invalid_argument for another dimension
     void go_on_from(double t, std::span<const double> x, bool changed)
     {
@@ -97,7 +97,7 @@ private:
     {
         require(calls_.dky(t0_ + s < end_ ? t0_ + s : end_, k, view(x_, x)));
     }
-    /// @throws std::runtime_error
+    /// @throws std::runtime_error if `flag` is an error
     static void require(int flag)
     {
         if (flag >= 0) return;
@@ -106,10 +106,10 @@ private:
 
     Calls calls_;
     View x_, dxdt_;
-    double stop_ = std::numeric_limits<double>::quiet_NaN();  ///< [s] as it has been told
-    double end_ = 0;      ///< [s] of the last step of the integrator
+    double stop_ = std::numeric_limits<double>::quiet_NaN();  ///< [s] stop time last set
+    double end_ = 0;      ///< [s] end of the last step of the integrator
     bool first_ = true;   ///< the next step is the first since the method started
-    bool cubic_ = false;  ///< of the last step
+    bool cubic_ = false;  ///< the last step is shown as a cubic
 };
 
 }  // namespace ricochet::hosts::detail
