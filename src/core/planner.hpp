@@ -477,8 +477,8 @@ private:
         return {.time = clock(t), .t = t, .x = &x};
     }
 
-    /// A check by which the lower bound there or, below the surface, the upper bound covers guard i,
-    /// if one does.
+    /// A check by which the lower bound there or, below the surface, the upper bound covers guard
+    /// i, if one does.
     [[nodiscard]] std::optional<Check> bound_at(std::size_t i, std::size_t k, const Step<X>& step,
                                                 const Bank& bank, Statistics& counts)
     {

@@ -201,17 +201,22 @@ SystemId Scene::system(const SystemBody& body)
     const auto first = static_cast<std::uint32_t>(bodies_.size());
     const std::vector<double> x = body.motion->start();
     for (const double component : x) require_finite(who, label + ": state", component);
-    for (std::uint32_t k = 0; k < count; ++k) {
-        const double radius = body.motion->radius(k);
-        require_positive(who, label + ": shape_radius", radius);
-        const SystemDisc disc = body.motion->shape(k, body.motion->start_mode(), 0, x);
-        const std::string name = count == 1 ? label : fmt::format("{} {}", label, k);
-        add({.name = name,
-             .at = disc.at,
-             .velocity = disc.velocity,
-             .radius = radius,
-             .material = body.material},
-            "system");
+    try {
+        for (std::uint32_t k = 0; k < count; ++k) {
+            const double radius = body.motion->radius(k);
+            require_positive(who, label + ": shape_radius", radius);
+            const SystemDisc disc = body.motion->shape(k, body.motion->start_mode(), 0, x);
+            const std::string name = count == 1 ? label : fmt::format("{} {}", label, k);
+            add({.name = name,
+                 .at = disc.at,
+                 .velocity = disc.velocity,
+                 .radius = radius,
+                 .material = body.material},
+                "system");
+        }
+    } catch (...) {  // a system that is refused leaves no discs behind
+        for (; bodies_.size() > first; bodies_.pop_back()) names_.erase(bodies_.back().name);
+        throw;
     }
     systems_.push_back({body.motion, first, count});
     return {static_cast<std::uint32_t>(systems_.size() - 1)};
@@ -273,6 +278,21 @@ void Scene::require_outside(const Disc& body, const Surface& surface) const
     }
 }
 
+std::vector<Vector2> Scene::places_at(double t) const
+{
+    std::vector<Vector2> places;
+    places.reserve(bodies_.size());
+    for (const Disc& body : bodies_) places.push_back(body.at);
+    for (const System& system : systems_) {
+        const std::vector<double> x = system.motion->start();
+        for (std::uint32_t k = 0; k < system.count; ++k) {
+            places[system.first + k] =
+                system.motion->shape(k, system.motion->start_mode(), t, x).at;
+        }
+    }
+    return places;
+}
+
 void Scene::check(double t_start) const
 {
     for (std::uint32_t s = 0; s < surfaces_.size(); ++s) {
@@ -298,23 +318,26 @@ void Scene::check(double t_start) const
             }
         }
     }
+    const std::vector<Vector2> places =
+        systems_.empty() ? std::vector<Vector2>{} : places_at(t_start);
+    const auto at = [&](std::uint32_t i) { return places.empty() ? bodies_[i].at : places[i]; };
     // Ordered by the left edge: a body that begins before another one ends may overlap it.
     std::vector<std::uint32_t> order(bodies_.size());
     for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-    const auto left = [&](std::uint32_t i) { return bodies_[i].at[0] - bodies_[i].radius; };
+    const auto left = [&](std::uint32_t i) { return at(i)[0] - bodies_[i].radius; };
     if (!std::ranges::is_sorted(order, {}, left)) std::ranges::sort(order, {}, left);
     std::vector<std::uint32_t> open;
     for (const std::uint32_t i : order) {
         const Disc& a = bodies_[i];
-        std::erase_if(
-            open, [&](std::uint32_t j) { return bodies_[j].at[0] + bodies_[j].radius < left(i); });
+        std::erase_if(open,
+                      [&](std::uint32_t j) { return at(j)[0] + bodies_[j].radius < left(i); });
         for (const std::uint32_t j : open) {
             const Disc& b = bodies_[j];
             const double reach = a.radius + b.radius;
-            if (reach == 0 || std::fabs(a.at[1] - b.at[1]) > reach) continue;
+            if (reach == 0 || std::fabs(at(i)[1] - at(j)[1]) > reach) continue;
             if (!systems_.empty() && system_of(i) && system_of(i) == system_of(j)) continue;
-            const double overlap = reach - norm(a.at - b.at);
-            if (overlap > rounding_of(a.at, a.radius) + rounding_of(b.at, b.radius)) {
+            const double overlap = reach - norm(at(i) - at(j));
+            if (overlap > rounding_of(at(i), a.radius) + rounding_of(at(j), b.radius)) {
                 const auto [first, second] = std::minmax(i, j);
                 throw Misplaced(
                     fmt::format("Scene: {} and {} overlap by {:.3g} at the start",

@@ -303,5 +303,45 @@ TEST(SceneSystems, WhatIsNoBodyIsNamed)
               0u);
 }
 
+/// A disc that a clock carries along: its place is that of the time.
+struct Carried {
+    using State = std::array<double, 1>;
+    std::size_t shape_count = 2;
+
+    void flow(double, const State&, State& dxdt) const { dxdt = {0}; }
+    double shape_radius(std::size_t) const { return 0.1; }
+    SystemDisc shape(std::size_t k, double t, const State&) const
+    {
+        return {{t, 3.0 * static_cast<double>(k)}, {1, 0}};
+    }
+    double shape_acceleration(std::size_t, double, const State&) const { return 0; }
+    void push(std::size_t, double, State&, const Vector2&) const {}
+};
+
+TEST(SceneSystems, AreWhereTheTimeOfTheStartHasThem)
+{
+    Scene scene;
+    scene.system({.name = "carried", .motion = system_body(Carried{}, Carried::State{})});
+    scene.disc({.name = "still", .at = {5, 0}, .radius = 0.1});
+    EXPECT_EQ(refusal([&] { scene.check(0); }), "accepted");
+    EXPECT_NE(refusal([&] { scene.check(5); }).find("carried 0 and still overlap by 0.2"),
+              std::string::npos);
+}
+
+TEST(SceneSystems, ThatAreRefusedLeaveNoDiscsBehind)
+{
+    Scene scene;
+    scene.disc({.name = "arm 1", .at = {5, 0}, .radius = 0.1});
+    const auto add = [&](const std::string& name) {
+        scene.system({.name = name, .motion = system_body(Carried{}, Carried::State{})});
+    };
+    EXPECT_EQ(refusal([&] { add("arm"); }), "Scene: the name \"arm 1\" is given twice");
+    EXPECT_EQ(scene.bodies().size(), 1u);
+    add("leg");
+    EXPECT_EQ(scene.bodies().size(), 3u);
+    EXPECT_EQ(scene.body("leg 1").index, 2u);
+    EXPECT_NE(refusal([&] { static_cast<void>(scene.body("arm 0")); }), "accepted");
+}
+
 }  // namespace
 }  // namespace ricochet::systems_test

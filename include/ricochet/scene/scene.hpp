@@ -183,6 +183,8 @@ private:
     BodyId add(const Disc& body, std::string_view kind);
     void take_name(const std::string& name, std::string_view kind);
     void require_material(MaterialId material, std::string_view who) const;
+    /// Centres of all bodies at t [s]: those of systems move with the time, too.
+    [[nodiscard]] std::vector<Vector2> places_at(double t) const;
     void require_outside(const Disc& body, const Surface& surface) const;
 
     Settings settings_;

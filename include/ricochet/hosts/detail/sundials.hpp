@@ -5,6 +5,8 @@
 
 #include <sundials/sundials_nvector.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <limits>
 #include <memory>
@@ -44,6 +46,11 @@ public:
         if (end_ > t0_) {
             t1_ = end_;
             require(calls_.dky(t1_, 0, view(x_, x1_)));
+        } else if (t_stop - t0_ <= room_for_a_step(t_stop)) {
+            for (std::size_t i = 0; i < x1_.size(); ++i) x1_[i] += (t_stop - t0_) * rate0_[i];
+            start_anew(t_stop);
+            cubic_ = true;
+            return;
         } else {
             if (std::exchange(stop_, t_stop) != t_stop) require(calls_.set_stop(t_stop));
             do {  // a step may be too short to be seen in the time
@@ -77,14 +84,26 @@ public:
         }
         go_to(t, x);
         if (!changed) return require(calls_.dky(t, 1, view(x_, rate1_)));
-        end_ = t;
+        start_anew(t);
+    }
+
+private:
+    /// Initialises the integrator at t and the state at the end of the step.
+    void start_anew(double t)
+    {
+        t1_ = end_ = t;
         first_ = true;
         stop_ = std::numeric_limits<double>::quiet_NaN();
         require(calls_.reinit(t, view(x_, x1_)));
         require(calls_.rate(t, view(x_, x1_), view(dxdt_, rate1_)));
     }
+    /// [s] The integrators refuse a first step of two roundings of the time.
+    [[nodiscard]] double room_for_a_step(double t_stop) const
+    {
+        return 4 * std::numeric_limits<double>::epsilon() *
+               std::max(std::fabs(t0_), std::fabs(t_stop));
+    }
 
-private:
     using View = std::shared_ptr<std::remove_pointer_t<N_Vector>>;
 
     [[nodiscard]] static N_Vector view(const View& vector, std::span<double> of)
