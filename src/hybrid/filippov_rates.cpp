@@ -25,13 +25,16 @@ struct Bilinear {
     }
 };
 
-[[nodiscard]] double outside(const Shares& shares) noexcept
+/// Determinant of the derivatives of p and q with respect to both unknowns.
+[[nodiscard]] double determinant_at(const Bilinear& p, const Bilinear& q, const Shares& at) noexcept
 {
-    return std::max({-shares.first, shares.first - 1, -shares.second, shares.second - 1});
+    return (p.p1 + p.p3 * at.second) * (q.p2 + q.p3 * at.first) -
+           (p.p2 + p.p3 * at.first) * (q.p1 + q.p3 * at.second);
 }
 
 /// The common zero of p and q, from the quadratic that remains when the second unknown is
-/// eliminated. False: there is none.
+/// eliminated: of two zeros the one with the larger determinant, since the other is a saddle. False
+/// if there is none.
 [[nodiscard]] bool eliminated_zero(const Bilinear& p, const Bilinear& q,
                                    SlidingShares& best) noexcept
 {
@@ -43,19 +46,52 @@ struct Bilinear {
     const double sum = -0.5 * (c1 + std::copysign(root, c1));
 
     bool found = false;
-    for (const double first : {sum / c2, c0 / sum}) {
+    // Where a pair has vanished, both have their real part.
+    const double other = discriminant < 0 ? sum / c2 : c0 / sum;
+    for (const double first : {sum / c2, other}) {
         const double by_p = p.p2 + p.p3 * first;
         const double by_q = q.p2 + q.p3 * first;
         const double second = std::fabs(by_p) >= std::fabs(by_q) ? -(p.p0 + p.p1 * first) / by_p
                                                                  : -(q.p0 + q.p1 * first) / by_q;
         const Shares shares{first, second};
         if (std::isfinite(first) && std::isfinite(second) &&
-            (!found || outside(shares) < outside(best.shares))) {
+            (!found || determinant_at(p, q, shares) > determinant_at(p, q, best.shares))) {
             best = {shares, discriminant / (c1 * c1 + 4 * std::fabs(c2 * c0))};
             found = true;
         }
     }
     return found;
+}
+
+/// 1 if both surfaces have the same normalised rates, -1 if opposite ones: the surfaces coincide,
+/// or their shares move as if they did. Otherwise 0.
+[[nodiscard]] double common_sign(const RegionRates& r) noexcept
+{
+    const double sign =
+        r[0][0] * r[1][0] + r[0][1] * r[1][1] + r[0][2] * r[1][2] + r[0][3] * r[1][3] < 0 ? -1 : 1;
+    for (std::size_t k = 0; k < 4; ++k) {
+        if (!(std::fabs(r[1][k] - sign * r[0][k]) <= 0x1p-40)) return 0;
+    }
+    return sign;
+}
+
+/// The shares (1/2 + s, 1/2 + sign s) of surfaces that coincide, where s' = p(s) is at rest and, if
+/// there are two such places, returns.
+[[nodiscard]] SlidingShares common_zero(const Bilinear& p, double sign) noexcept
+{
+    const double c0 = p.p0 + 0.5 * (p.p1 + p.p2) + 0.25 * p.p3;
+    const double c1 = p.p1 + sign * p.p2 + 0.5 * (1 + sign) * p.p3;
+    const double c2 = sign * p.p3;
+    const double discriminant = c1 * c1 - 4 * c2 * c0;
+    const double terms = c1 * c1 + 4 * std::fabs(c2 * c0);
+    const double root = std::sqrt(std::max(0.0, discriminant));
+    double s = 0;
+    if (c1 <= 0) {
+        s = c0 == 0 ? 0 : 2 * c0 / (root - c1);
+    } else {
+        s = c2 == 0 ? -c0 / c1 : -(c1 + root) / (2 * c2);
+    }
+    return {{0.5 + s, 0.5 + sign * s}, terms > 0 ? discriminant / terms : 1};
 }
 
 /// Values of both bilinear functions, and their derivatives.
@@ -218,6 +254,7 @@ SlidingShares sliding_shares(const RegionRates& rates) noexcept
     const RegionRates r = normalised(rates);
     const Bilinear p(r[0]);
     const Bilinear q(r[1]);
+    if (const double sign = common_sign(r); sign != 0) return common_zero(p, sign);
     SlidingShares result;
     // The same physical unknown is eliminated whichever surface is called the first.
     if (std::fabs(p.p1) >= std::fabs(q.p2)) {

@@ -26,25 +26,30 @@ void validate(const Options& options, bool step_required, std::string_view who)
     } else {
         require(std::isfinite(o.step) && o.step >= 0,
                 "step must be positive, or zero to have it estimated", o.step);
-        require(std::isfinite(o.rtol) && o.rtol >= 0, "rtol must be zero or positive", o.rtol);
-        require(std::isfinite(o.atol) && o.atol >= 0, "atol must be zero or positive", o.atol);
+        require(std::isfinite(o.rtol) && o.rtol >= 0, "rtol must be zero or positive, and finite",
+                o.rtol);
+        require(std::isfinite(o.atol) && o.atol >= 0, "atol must be zero or positive, and finite",
+                o.atol);
         for (const double atol : o.component_atol) {
             require(std::isfinite(atol) && atol >= 0,
-                    "every component_atol must be zero or positive", atol);
+                    "every component_atol must be zero or positive, and finite", atol);
         }
         const bool any_zero =
             o.component_atol.empty() ? o.atol == 0 : std::ranges::count(o.component_atol, 0.0) > 0;
         require(o.rtol > 0 || !any_zero, "rtol must be positive where an absolute one is zero",
                 o.rtol);
-        require(std::isfinite(o.h_min) && o.h_min >= 0, "h_min must be zero or positive", o.h_min);
-        require(o.h_max > o.h_min, "h_max must be above h_min", o.h_max);
+        require(std::isfinite(o.h_min) && o.h_min >= 0,
+                "h_min must be zero or positive, and finite", o.h_min);
+        if (!(o.h_max > o.h_min)) {
+            refuse_options(fmt::format("h_max must be above h_min = {}, got {}", o.h_min, o.h_max));
+        }
     }
     require(std::isfinite(o.event_tolerance) && o.event_tolerance >= 0,
-            "event_tolerance must be zero or positive", o.event_tolerance);
-    require(std::isfinite(o.event_rtol) && o.event_rtol >= 0, "event_rtol must be zero or positive",
-            o.event_rtol);
+            "event_tolerance must be zero or positive, and finite", o.event_tolerance);
+    require(std::isfinite(o.event_rtol) && o.event_rtol >= 0,
+            "event_rtol must be zero or positive, and finite", o.event_rtol);
     require(std::isfinite(o.event_window) && o.event_window >= 0,
-            "event_window must be zero or positive", o.event_window);
+            "event_window must be zero or positive, and finite", o.event_window);
 
     const bool backward = o.t_end < o.t_start;
     double previous = o.t_start;

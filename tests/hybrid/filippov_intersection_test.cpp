@@ -638,6 +638,86 @@ TEST(Filippov, TheMotionDoesNotDependOnTheNumbersOfTheSurfaces)
 
 // --- the algebra of sliding on two surfaces ---
 
+/// Fields whose rates have two common zeros in the unit square of the shares: one near (0.1, 0.1),
+/// and a saddle near (0.5, 0.5). The third component moves with the weight of the last field.
+Quadrants with_a_saddle()
+{
+    return {{{{0.02, 0.05, 0}, {-1, -0.25, 0}, {1, -0.25, 0}, {0, 0.45, 1}}}};
+}
+
+TEST(Filippov, TheMotionSlidesWithTheSharesAtWhichSteepSwitchingSettles)
+{
+    // Steep switching, in the limit: a' and b' are the rates, from the corner of the arrival.
+    const auto settled = [](const Quadrants& of) {
+        std::array<double, 2> at{};
+        for (int i = 0; i < 200000; ++i) {
+            const auto w = detail::Shares{at[0], at[1]}.weights();
+            std::array<double, 2> next = at;
+            for (std::size_t k = 0; k < 2; ++k) {
+                double rate = 0;
+                for (std::size_t r = 0; r < 4; ++r) rate += w[r] * of.fields[r][k];
+                next[k] = std::clamp(at[k] + 0.01 * rate, 0.0, 1.0);
+            }
+            at = next;
+        }
+        return at;
+    };
+    const auto shares = settled(with_a_saddle());
+    for (const bool swapped : {false, true}) {
+        Quadrants fields = with_a_saddle();
+        fields.swapped = swapped;
+        const Two two(fields);
+        const auto run = run_from(two, {-0.1, -0.1, 0}, 10);
+        ASSERT_EQ(run.mode, Two::mode_of(s, s));
+        const auto own = two.shares(run.mode, run.t, run.x);
+        EXPECT_NEAR(own[swapped ? 1 : 0], shares[0], 1e-12);
+        EXPECT_NEAR(own[swapped ? 0 : 1], shares[1], 1e-12);
+        // It slides from its arrival on; z is of the weight of the last field until the end.
+        EXPECT_NEAR(run.x[2], shares[0] * shares[1] * (10 - run.events.back().t), 0.05);
+    }
+}
+
+/// Two relays of one surface, x = 0 and k x = 0, against a force 2 t:
+/// x' = 2 t - sign(x) u0 - sign(k x) u1.
+struct CoincidingRelays {
+    static constexpr std::size_t surface_count = 2;
+    using State = std::array<double, 2>;
+    double k, u0, u1;
+
+    double surface(std::size_t which, double, const auto& x) const
+    {
+        return which == 0 ? x[0] : k * x[0];
+    }
+    double surface_rate(std::size_t which, double, const auto&, const auto& dxdt) const
+    {
+        return which == 0 ? dxdt[0] : k * dxdt[0];
+    }
+    void field(std::size_t region, double t, const auto&, auto& dxdt) const
+    {
+        const double s0 = (region & 1) ? 1 : -1;
+        const double s1 = (region & 2) ? 1 : -1;
+        dxdt = {2 * t - s0 * u0 - s1 * u1, 0};
+    }
+};
+
+TEST(Filippov, RelaysOnOneSurfaceReleaseTogether)
+{
+    for (const double k : {1.0, 2.0, 0.5, 3.0, -1.0, -0.7}) {
+        for (const double u1 : {0.1, 0.3, 0.55}) {
+            // Together they hold against u0 + u1, where k turns one of them against u0 - u1.
+            const double release = 0.5 * (0.6 + (k > 0 ? u1 : -u1));
+            const Filippov<CoincidingRelays> relays(CoincidingRelays{k, 0.6, u1});
+            for (const double start : {0.0, -1e-4}) {  // the second arrives at once
+                const auto run = run_from(relays, {start, 0}, 1.6);
+                EXPECT_EQ(run.outcome, Outcome::reached_end);
+                ASSERT_FALSE(run.events.empty());
+                EXPECT_NEAR(run.events.back().t, release, 1e-9) << k << ' ' << u1;
+                EXPECT_NEAR(run.x[0], (1.6 - release) * (1.6 - release), 1e-9) << k << ' ' << u1;
+            }
+        }
+    }
+}
+
 detail::RegionRates random_rates(std::mt19937& random)
 {
     std::uniform_real_distribution<double> number(-1, 1);

@@ -161,7 +161,7 @@ TEST(ComponentAtol, IsOneForEachComponent)
               "integrate: component_atol must have one number for each of the 2 components of the "
               "start, got 1");
     EXPECT_EQ(with(1e-8, {1e-9, -1}),
-              "integrate: every component_atol must be zero or positive, got -1");
+              "integrate: every component_atol must be zero or positive, and finite, got -1");
     EXPECT_EQ(with(0, {1e-9, 0}),
               "integrate: rtol must be positive where an absolute one is zero, got 0");
     EXPECT_EQ(with(0, {1e-9, 1e-7}), "accepted");

@@ -881,7 +881,7 @@ TEST(MonitorRefusals, StartsAndArraysThatAreNone)
     EXPECT_THROW(monitor.start(Instant{0}, X{1, 0}, X{}, inf), std::invalid_argument);
     EXPECT_THROW((void)monitor.side(1), std::out_of_range);
     EXPECT_EQ(refusal([&] { (void)EventMonitor(ball, X{}, {.event_tolerance = -1}); }),
-              "EventMonitor: event_tolerance must be zero or positive, got -1");
+              "EventMonitor: event_tolerance must be zero or positive, and finite, got -1");
     struct Empty {
         void flow(double, const X1&, X1& dxdt) const { dxdt = {0}; }
     };

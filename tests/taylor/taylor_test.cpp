@@ -497,5 +497,35 @@ TEST(Taylor, WhatCannotBeExpandedIsRefusedBeforeTheRun)
     EXPECT_THROW(static_cast<void>(run(Pendulum{}, {.order = 14})), std::invalid_argument);
 }
 
+/// e^t meets 2, 3, ...: as many levels as the object says.
+struct Levels {
+    using State = std::array<double, 1>;
+    std::size_t levels = 2;
+
+    [[nodiscard]] std::size_t guard_count() const { return levels; }
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, 1>& x, std::array<S, 1>& dxdt) const
+    {
+        dxdt[0] = x[0];
+    }
+    template <class S>
+    [[nodiscard]] S guard(std::size_t which, const S& /*t*/, const std::array<S, 1>& x) const
+    {
+        return 2 + static_cast<double>(which) - x[0];
+    }
+};
+
+TEST(Taylor, GuardsThatTheObjectCountsAreSampled)
+{
+    for (const std::size_t levels : {0U, 1U, 4U}) {
+        const auto run = integrate(Levels{levels}, {1.0}, {.t_end = 3, .rtol = 1e-12},
+                                   ErrorControlled<Taylor>{});
+        ASSERT_EQ(run.events.size(), levels);
+        for (std::size_t k = 0; k < levels; ++k) {
+            EXPECT_NEAR(run.events[k].t, std::log(2.0 + static_cast<double>(k)), 1e-12);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace ricochet::taylor_test

@@ -88,10 +88,10 @@ struct SlidingShares {
     double apart = 1;
 };
 
-/// The zero of two bilinear functions of two unknowns that is in the unit square or
-/// nearest to it. If a pair of zeros has just vanished, the place where it vanished. Where
-/// the rates do not determine a share (a rate that all fields have in common is zero), the
-/// zero nearest to (1/2, 1/2).
+/// The zero of both rates that steep switching settles at: of two, the one that is no saddle. If a
+/// pair of zeros has just vanished, the place where it vanished. Of surfaces that coincide, the zero
+/// on the line on which their shares move together. Where the rates do not determine a share (all
+/// fields have the same rate, zero), the zero nearest to (1/2, 1/2).
 [[nodiscard]] SlidingShares sliding_shares(const RegionRates& rates) noexcept;
 
 /// Places of a motion that starts on the intersection of two surfaces.

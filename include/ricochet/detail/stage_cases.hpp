@@ -53,8 +53,8 @@ void smooth_at_trial(StageScratch<N, M>& scratch, double t, const Factor& factor
 /// Solves the inequality with f replaced by its tangent at w: `scratch.reaction` and the state
 /// `scratch.trial` that it has. False where no reaction satisfies the law.
 template <int N, int M, class Factor>
-[[nodiscard]] bool solve_tangent(StageScratch<N, M>& scratch, const Stage<N, M>& stage,
-                                 const Factor& factor, BranchesOf<M>& branches, bool frozen)
+[[nodiscard]] bool solve_tangent(StageScratch<N, M>& scratch, const Factor& factor,
+                                 BranchesOf<M>& branches, bool frozen)
 {
     const auto& m = scratch.m;
     auto& inequality = scratch.inequality;
@@ -97,7 +97,7 @@ template <int N, int M>
         }
         scratch.base.noalias() = factor.jacobian * w;
         scratch.base = stage.q + stage.kappa * (scratch.f - scratch.base);
-        if (!solve_tangent(scratch, stage, factor, branches, frozen)) {
+        if (!solve_tangent(scratch, factor, branches, frozen)) {
             return {.iterations = iteration, .set = 0};
         }
 

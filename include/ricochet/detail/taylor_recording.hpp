@@ -458,10 +458,15 @@ template <class System, class Xs>
 template <class System, class Xs>
 concept ScalarGuardsOn = GuardReturns<System, Recorded, Xs, Recorded>;
 
+template <class System>
+inline constexpr bool counts_guards_at_run_time =
+    CountsGuards<System> && !CountsGuardsFixed<System>;
+
 /// Whether all guards take any scalar, and there is a constant number of them.
 template <class System, std::size_t n>
-concept ScalarGuards = fixed_guard_count<System, std::array<double, n>>()
-> 0 && ScalarGuardsOn<System, std::array<Recorded, n>>;
+concept ScalarGuards =
+    !counts_guards_at_run_time<System> && fixed_guard_count<System, std::array<double, n>>() > 0 &&
+    ScalarGuardsOn<System, std::array<Recorded, n>>;
 
 [[noreturn]] inline void throw_rates_differ(std::size_t found, std::size_t expected)
 {

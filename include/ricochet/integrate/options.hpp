@@ -38,8 +38,8 @@ struct Options {
     double event_tolerance = 0;
     double event_rtol = 0;
 
-    /// [s] Events no further apart than max(event_window, event tolerance, 4 units in the
-    /// last place of t) happen together: they form one set, applied once.
+    /// [s] Guards that fire within max(event_window, event tolerance, 4 ulp of t) of the first form
+    /// one set, applied once. A time event joins those before it in this time, not those after it.
     double event_window = 0;
 
     /// Whether detectors that can (`ChecksInside`) evaluate every guard once inside each step as
