@@ -77,6 +77,16 @@ TYPED_TEST_P(LocatorSuite, AStartOnTheSurfaceIsNotTheEvent)
     EXPECT_NEAR(locate<TypeParam>(step, Side::above).hi, 1, 4e-16);
 }
 
+TYPED_TEST_P(LocatorSuite, RoundingBesideTheStartIsNotTheEvent)
+{
+    // Leaves the surface downwards, a rounding below it, and comes back at s = 0.1. The rounding of
+    // the time 8 + s makes it positive at s = 1e-15, too, where the secant of the ends leads.
+    const HostStep step(
+        0.11, [](double s) { return ((8 + s) - 8) - 1.1 * s + s * s - 1e-17; },
+        [](double s) { return 2 * s - 0.1; });
+    EXPECT_NEAR(locate<TypeParam>(step, Side::below).hi, 0.1, 2e-14);
+}
+
 TYPED_TEST_P(LocatorSuite, AVeryShortFlightInALongStepIsFound)
 {
     const double flight = 1e-9;
@@ -171,7 +181,8 @@ TYPED_TEST_P(LocatorSuite, TheNumberOfStepsTakenIsBounded)
 
 REGISTER_TYPED_TEST_SUITE_P(LocatorSuite, ClosesToNeighbouringOffsets, TheBracketHoldsTheCrossing,
                             StopsAtTheTolerance, ARisingCrossingIsLocatedAsWell,
-                            AStartOnTheSurfaceIsNotTheEvent, AVeryShortFlightInALongStepIsFound,
+                            AStartOnTheSurfaceIsNotTheEvent, RoundingBesideTheStartIsNotTheEvent,
+                            AVeryShortFlightInALongStepIsFound,
                             AFlatCrossingIsLocatedToTheRoundingOfTheGuard,
                             AJumpIsLocatedAlthoughItHasNoSlope, ASaturatedGuardIsLocatedAllTheSame,
                             APoleIsNoCrossing, ASteepCrossingIsNoJumpAtAnyTolerance,

@@ -10,6 +10,14 @@
 
 namespace ricochet {
 
+namespace {
+
+/// Fraction of the guard at the far end of a bracket below which its value at the near end
+/// predicts nothing.
+constexpr double negligible_part = 0x1p-10;
+
+}  // namespace
+
 Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
 {
     const auto narrow_enough = [&](double a, double b) {
@@ -31,10 +39,13 @@ Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi, double
     const auto halve = [&] { (void)sample_at(lo.s + (hi.s - lo.s) / 2); };
     // A step that begins on the surface, or behind it by rounding, has no sign there.
     while (path.has_left(lo) && !narrow_enough(lo.s, hi.s)) halve();
-    // After an event the start has a sign and no value, from which the first secant would lead
-    // nowhere.
-    constexpr double least = std::numeric_limits<double>::min();
-    while (std::fabs(lo.value) <= least && !narrow_enough(lo.s, hi.s)) halve();
+    // After an event the start has a sign, but no value or that of rounding. From there the first
+    // secant would lead nowhere, or to noise beside the start, as if the guard crossed once more.
+    const auto start_is_negligible = [&] {
+        constexpr double least = std::numeric_limits<double>::min();
+        return std::fabs(lo.value) <= std::max(least, negligible_part * std::fabs(hi.value));
+    };
+    while (start_is_negligible() && !narrow_enough(lo.s, hi.s)) halve();
     if (lo.value * hi.value < 0 && std::isfinite(lo.value * hi.value) &&
         !narrow_enough(lo.s, hi.s)) {
         std::uintmax_t iterations = 200;
