@@ -89,9 +89,9 @@ struct SlidingShares {
 };
 
 /// The zero of both rates that steep switching settles at: of two, the one that is no saddle. If a
-/// pair of zeros has just vanished, the place where it vanished. Of surfaces that coincide, the zero
-/// on the line on which their shares move together. Where the rates do not determine a share (all
-/// fields have the same rate, zero), the zero nearest to (1/2, 1/2).
+/// pair of zeros has just vanished, the place where it vanished. Of surfaces that coincide, the
+/// zero on the line on which their shares move together. Where the rates do not determine a share
+/// (all fields have the same rate, zero), the zero nearest to (1/2, 1/2).
 [[nodiscard]] SlidingShares sliding_shares(const RegionRates& rates) noexcept;
 
 /// Places of a motion that starts on the intersection of two surfaces.
