@@ -308,14 +308,15 @@ private:
             out = c / a;
             inverse_[i] = -1 / a;
         } else {
-            begin_function<i>(a, b);
+            begin_function<i>();
         }
     }
 
     template <int i>
-    [[gnu::always_inline]] void begin_function(const S& a, const S& b)
+    [[gnu::always_inline]] void begin_function()
     {
         constexpr TapeOp op = op_at(i);
+        const S a = c_[op.a][0];
         S& out = c_[i][0];
         const auto of_a = [&](const auto& f) __attribute__((always_inline))
         {
@@ -353,15 +354,15 @@ private:
             out = of_a([](double v) { return std::tanh(v); });
         } else if constexpr (op.op == TaylorOp::arc_sine) {
             out = of_a([](double v) { return std::asin(v); });
-            inverse_[i] = 1 / b;
+            inverse_[i] = 1 / c_[op.b][0];
         } else if constexpr (op.op == TaylorOp::arc_cosine) {
             out = of_a([](double v) { return std::acos(v); });
-            inverse_[i] = 1 / b;
+            inverse_[i] = 1 / c_[op.b][0];
         } else if constexpr (op.op == TaylorOp::arc_tangent) {
             out = of_a([](double v) { return std::atan(v); });
-            inverse_[i] = 1 / b;
+            inverse_[i] = 1 / c_[op.b][0];
         } else if constexpr (op.op == TaylorOp::angle) {
-            out = map_lanes(a, b, [](double y, double x) { return std::atan2(y, x); });
+            out = map_lanes(a, c_[op.b][0], [](double y, double x) { return std::atan2(y, x); });
             inverse_[i] = 1 / c_[op.c][0];
         }
     }
