@@ -202,11 +202,14 @@ template <bool wide>
 [[gnu::always_inline]] inline void map_circle(const LanePack<wide>& x, LanePack<wide>& sine,
                                               LanePack<wide>& cosine)
 {
+    LanePack<wide> sines(0.0), cosines(0.0);  // a lane is put into what is there
     for (std::size_t lane = 0; lane < lane_count; ++lane) {
         const double angle = x[lane];
-        sine.set(lane, std::sin(angle));
-        cosine.set(lane, std::cos(angle));
+        sines.set(lane, std::sin(angle));
+        cosines.set(lane, std::cos(angle));
     }
+    sine = sines;
+    cosine = cosines;
 }
 
 /// |x|
