@@ -7,6 +7,7 @@
 // function that is compiled for another machine than its file they are inlined.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -101,6 +102,21 @@ struct LanePack {
         if constexpr (!wide) parts.high = a - Vector{};
     }
 
+    /// f(lane) in each lane.
+    template <class F>
+    [[nodiscard, gnu::always_inline]] static LanePack of_lanes(const F& f)
+    {
+        using Vector = typename LaneParts<double, wide>::Vector;
+        LanePack out;
+        if constexpr (wide) {
+            out.parts.low = Vector{f(0), f(1), f(2), f(3)};
+        } else {
+            out.parts.low = Vector{f(0), f(1)};
+            out.parts.high = Vector{f(2), f(3)};
+        }
+        return out;
+    }
+
     [[nodiscard, gnu::always_inline]] double operator[](std::size_t lane) const noexcept
     {
         return parts.at(lane);
@@ -183,18 +199,14 @@ template <bool wide, class F>
 [[nodiscard, gnu::always_inline]] inline LanePack<wide> map_lanes(const LanePack<wide>& x,
                                                                   const F& f)
 {
-    LanePack<wide> out;
-    for (std::size_t lane = 0; lane < lane_count; ++lane) out.set(lane, f(x[lane]));
-    return out;
+    return LanePack<wide>::of_lanes([&](std::size_t lane) { return f(x[lane]); });
 }
 template <bool wide, class F>
 [[nodiscard, gnu::always_inline]] inline LanePack<wide> map_lanes(const LanePack<wide>& x,
                                                                   const LanePack<wide>& y,
                                                                   const F& f)
 {
-    LanePack<wide> out;
-    for (std::size_t lane = 0; lane < lane_count; ++lane) out.set(lane, f(x[lane], y[lane]));
-    return out;
+    return LanePack<wide>::of_lanes([&](std::size_t lane) { return f(x[lane], y[lane]); });
 }
 
 /// sin(x) and cos(x), lane by lane: one call for both.
@@ -202,14 +214,14 @@ template <bool wide>
 [[gnu::always_inline]] inline void map_circle(const LanePack<wide>& x, LanePack<wide>& sine,
                                               LanePack<wide>& cosine)
 {
-    LanePack<wide> sines(0.0), cosines(0.0);  // a lane is put into what is there
+    std::array<double, lane_count> sines, cosines;
     for (std::size_t lane = 0; lane < lane_count; ++lane) {
         const double angle = x[lane];
-        sines.set(lane, std::sin(angle));
-        cosines.set(lane, std::cos(angle));
+        sines[lane] = std::sin(angle);
+        cosines[lane] = std::cos(angle);
     }
-    sine = sines;
-    cosine = cosines;
+    sine = LanePack<wide>::of_lanes([&](std::size_t lane) { return sines[lane]; });
+    cosine = LanePack<wide>::of_lanes([&](std::size_t lane) { return cosines[lane]; });
 }
 
 /// |x|
