@@ -98,7 +98,13 @@ class KernelOf {
     template <bool controlled, class Screen>
     RICOCHET_BY_ONES static void run_quietly(void* door, State& step, QuietRun& run)
     {
-        QuietSteps<System, X, Method, controlled, Screen>(door, step, run).go();
+        using Steps = QuietSteps<System, X, Method, controlled, Screen>;
+        FlowCaller<C> caller(door, step);
+        typename Of::Values of(step);
+        typename Of::Stages k;
+        typename Steps::Samples at{.sign = run.sign, .g0 = run.g0, .rate0 = run.rate0};
+        double h = run.h_next;
+        Steps{door, step, run, caller, of, k, at, h}.go();
     }
 
 public:

@@ -32,49 +32,60 @@ class QuietSteps {
     static constexpr ErrorRule rule{};
 
 public:
-    [[gnu::always_inline]] QuietSteps(void* door, StepState<C>& step, QuietRun& run)
-        : door_(door), step_(step), run_(run), caller_(door, step), of_(step)
-    {
-    }
+    /// Samples of the guard at both ends of a step, and inside.
+    struct Samples {
+        double sign, g0, rate0;
+        double g1 = 0, rate1 = 0, inside = 0;
+    };
+
+    // References to variables of the caller: as members they would not all be in registers.
+    void* door;
+    StepState<C>& step;
+    QuietRun& run;
+    FlowCaller<C>& caller;
+    Values& of;
+    Stages& k;
+    Samples& at;
+    double& h;
 
     [[gnu::always_inline]] void go()
     {
-        run_.why = QuietEnd::due;
-        run_.repeated = false;
+        run.why = QuietEnd::due;
+        run.repeated = false;
         while (goes_on()) {
-            double next = h_;
+            double next = h;
             if (!take(next)) {
-                leave(h_);
+                leave(h);
                 break;
             }
             if constexpr (guarded) {
-                run_.why = screen();
-                if (run_.why != QuietEnd::due) {
+                const QuietEnd why = screen();
+                if (why != QuietEnd::due) {
+                    run.why = why;
                     leave(next);
                     break;
                 }
-                g0_ = g1_;
-                g_rate0_ = g_rate1_;
+                at.g0 = at.g1;
+                at.rate0 = at.rate1;
             }
             accept();
-            h_ = next;
+            h = next;
         }
-        if (run_.why == QuietEnd::due) {
-            run_.h_next = h_;
+        if (run.why == QuietEnd::due) {
+            run.h_next = h;
             put_start();
         }
-        caller_.leave(step_);
-        run_.g0 = g0_;
-        run_.rate0 = g_rate0_;
-        run_.g1 = g1_;
-        run_.rate1 = g_rate1_;
-        run_.inside = inside_;
+        caller.leave(step);
+        run.g0 = at.g0;
+        run.rate0 = at.rate0;
+        run.g1 = at.g1;
+        run.rate1 = at.rate1;
+        run.inside = at.inside;
     }
 
 private:
     /// The state at the fraction `InsideOf::u` of the step, as `Step::peek` computes it.
-    [[gnu::always_inline]] static X peeked(double h, const Values& of,
-                                           [[maybe_unused]] const Stages& k)
+    [[nodiscard, gnu::always_inline]] X peeked() const
     {
         X x;
         const double s = InsideOf::u * h;
@@ -113,8 +124,7 @@ private:
         return std::max(h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
     }
 
-    [[nodiscard, gnu::always_inline]] static auto guard_of(void* door, QuietRun& run,
-                                                           const FlowCaller<C>& caller)
+    [[nodiscard, gnu::always_inline]] auto guard_at_end() const
     {
         if constexpr (std::is_same_v<System, ByPointer>) {
             static constexpr GuardInfo unused{};
@@ -128,10 +138,10 @@ private:
 
     [[nodiscard, gnu::always_inline]] bool goes_on() const
     {
-        if (run_.steps == run_.most_steps) return false;
-        const double until = caller_.start.until(run_.end);
-        if (h_ * (1 + 1e-6) >= (caller_.backward ? -until : until)) return false;
-        return !(run_.cancelled && run_.cancelled->load(std::memory_order_relaxed));
+        if (run.steps == run.most_steps) return false;
+        const double until = caller.start.until(run.end);
+        if (h * (1 + 1e-6) >= (caller.backward ? -until : until)) return false;
+        return !(run.cancelled && run.cancelled->load(std::memory_order_relaxed));
     }
 
     /// Takes a step, and repeats it with shorter ones until the error is in its tolerance;
@@ -139,100 +149,91 @@ private:
     [[gnu::always_inline]] bool take(double& next)
     {
         double largest = rule.largest;
-        run_.repeated = false;
+        run.repeated = false;
         for (;;) {
-            Of::template depart<controlled>(caller_, k_.data(), h_, of_);
-            const bool finite = Of::end(caller_, h_, of_);
+            Of::template depart<controlled>(caller, k.data(), h, of);
+            const bool finite = Of::end(caller, h, of);
             if constexpr (!controlled) {
-                if (!finite) run_.why = QuietEnd::failed;
+                if (!finite) run.why = QuietEnd::failed;
                 return finite;
             }
-            run_.error = finite ? Of::worst_ratio(step_, of_, run_.rtol, run_.atol)
-                                : std::numeric_limits<double>::quiet_NaN();
-            if (rule.accepts(run_.error)) {
-                const double factor = std::min(largest, rule.factor(run_.error, order));
-                next = std::min(h_ * factor, run_.h_max);
+            run.error = finite ? Of::worst_ratio(step, of, run.rtol, run.atol)
+                               : std::numeric_limits<double>::quiet_NaN();
+            if (rule.accepts(run.error)) {
+                const double factor = std::min(largest, rule.factor(run.error, order));
+                next = std::min(h * factor, run.h_max);
                 return true;
             }
-            const double shorter = h_ * rule.factor(run_.error, order);
-            if (!std::isfinite(run_.error) ||
-                shorter < smallest_step(run_.h_min, caller_.start.value)) {
-                run_.why = QuietEnd::failed;
+            const double shorter = h * rule.factor(run.error, order);
+            if (!std::isfinite(run.error) ||
+                shorter < smallest_step(run.h_min, caller.start.value)) {
+                run.why = QuietEnd::failed;
                 return false;
             }
-            ++run_.rejected;
-            h_ = shorter;
+            ++run.rejected;
+            h = shorter;
             largest = 1;
-            run_.repeated = true;
+            run.repeated = true;
         }
     }
 
     [[nodiscard, gnu::always_inline]] QuietEnd screen()
     {
-        const auto guard = guard_of(door_, run_, caller_);
-        const double t1 = caller_.time(h_);
-        const X x1 = of_.x1, rate1 = of_.rate1;
-        g1_ = guard.value(t1, x1);
-        if constexpr (rates) g_rate1_ = guard.raw_rate(t1, x1, rate1, h_);
+        const auto guard = guard_at_end();
+        const double t1 = caller.time(h);
+        const X x1 = of.x1, rate1 = of.rate1;
+        at.g1 = guard.value(t1, x1);
+        if constexpr (rates) at.rate1 = guard.raw_rate(t1, x1, rate1, h);
         QuietEnd why = QuietEnd::due;
         // The loop replaces a rate that is not finite.
-        if (Screen::suspects(run_.sign, g0_, g_rate0_, g1_, g_rate1_, h_) ||
-            !std::isfinite(g1_ + g_rate1_)) {
+        if (Screen::suspects(at.sign, at.g0, at.rate0, at.g1, at.rate1, h) ||
+            !std::isfinite(at.g1 + at.rate1)) {
             why = QuietEnd::doubt;
         }
-        if (rates && run_.checks_inside) {
-            const X x = peeked(h_, of_, k_);
-            inside_ = guard.value(caller_.time(CubicCheck::inside * h_), x);
-            const CubicCheck look(g0_, g_rate0_, g1_, g_rate1_, h_);
-            const double e = look.deviation(CubicCheck::inside, inside_);
-            if (!(look.lowest(run_.sign) > CubicCheck::doubt * e)) why = QuietEnd::doubt;
-            if (controlled && hardly_moves(of_.x0, x1)) why = QuietEnd::moving;
+        if (rates && run.checks_inside) {
+            const X x = peeked();
+            at.inside = guard.value(caller.time(CubicCheck::inside * h), x);
+            const CubicCheck look(at.g0, at.rate0, at.g1, at.rate1, h);
+            const double e = look.deviation(CubicCheck::inside, at.inside);
+            if (!(look.lowest(at.sign) > CubicCheck::doubt * e)) why = QuietEnd::doubt;
+            if (controlled && hardly_moves(of.x0, x1)) why = QuietEnd::moving;
         }
         return why;
     }
 
     [[gnu::always_inline]] void accept()
     {
-        caller_.start = caller_.start.after(caller_.backward ? -h_ : h_);
+        caller.start = caller.start.after(caller.backward ? -h : h);
         for_each_component(
-            of_.x0, [&](auto i) __attribute__((always_inline)) {
-                const TwoSum sum =
-                    two_sum(of_.x0[i], h_ * of_.rate0[i] + (of_.w[i] + of_.remainder[i]));
-                of_.x0[i] = sum.value;
-                of_.remainder[i] = sum.remainder;
-                of_.rate0[i] = of_.rate1[i];
+            of.x0, [&](auto i) __attribute__((always_inline)) {
+                const TwoSum sum = two_sum(of.x0[i], h * of.rate0[i] + (of.w[i] + of.remainder[i]));
+                of.x0[i] = sum.value;
+                of.remainder[i] = sum.remainder;
+                of.rate0[i] = of.rate1[i];
             });
-        ++run_.steps;
+        ++run.steps;
     }
 
     [[gnu::always_inline]] void put_start()
     {
-        step_.start = caller_.start;
-        Of::put(of_.x0, step_.x0);
-        Of::put(of_.rate0, step_.rate0);
-        Of::put(of_.remainder, step_.remainder);
+        step.start = caller.start;
+        Of::put(of.x0, step.x0);
+        Of::put(of.rate0, step.rate0);
+        Of::put(of.remainder, step.remainder);
     }
 
     /// Leaves the current step where the loop expects it.
     [[gnu::always_inline]] void leave(double next)
     {
         put_start();
-        step_.h = h_;
-        step_.has_middle = false;
-        step_.asked_alone = 0;
-        Of::store(step_, k_, of_);
-        run_.h_next = next;
+        step.h = h;
+        step.has_middle = false;
+        step.asked_alone = 0;
+        Of::store(step, k, of);
+        run.h_next = next;
     }
 
     static constexpr int order = Stepper::error_order_value + 1;
-    void* door_;
-    StepState<C>& step_;
-    QuietRun& run_;
-    FlowCaller<C> caller_;
-    Values of_;
-    Stages k_;
-    double h_ = run_.h_next;
-    double g0_ = run_.g0, g_rate0_ = run_.rate0, g1_ = 0, g_rate1_ = 0, inside_ = 0;
 };
 
 }  // namespace ricochet::detail
