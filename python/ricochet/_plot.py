@@ -3,13 +3,33 @@
 import numpy as np
 
 
+def _curve(run):
+    """Times and states to be joined by lines, with NaN where a reset has moved the state."""
+    solution = run.solution
+    t, x = run.times, run.states
+    if solution is not None and solution.ts.size > 1:
+        ends = solution.ts
+        span = abs(ends[-1] - ends[0])
+        fewest = 9 if ends.size < 500 else 2
+        times, states = [], []
+        for left, right in zip(ends[:-1], ends[1:]):
+            inside = np.linspace(left, right, fewest + int(500 * abs(right - left) / span))
+            times.append(inside)
+            states.append(np.hstack([solution(inside[:-1]), solution.before(inside[-1:])]))
+        t, x = np.concatenate(times), np.concatenate(states, axis=1).T
+    moved = np.any(np.diff(x, axis=0) != 0, axis=1)
+    jumps = np.flatnonzero((np.diff(t) == 0) & moved) + 1
+    return np.insert(t, jumps, np.nan), np.insert(x, jumps, np.nan, axis=0)
+
+
 def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None):
     """Draws the states of a run over time, with its events as dots.
 
     Parameters
     ----------
     run : Run or the result of `solve_ivp`
-        With states, so made with ``sample_times`` or ``record_steps``.
+        With states, so made with ``sample_times``, which are joined by straight lines, or with
+        ``record_steps``, whose solution is drawn as a curve.
     components : sequence of int
         Components to draw; by default all.
     labels : sequence of str
@@ -30,15 +50,11 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
     except ImportError:
         raise ImportError("ricochet.plot needs matplotlib, which was not found") from None
     run = getattr(run, "run", None) or run
-    t, x = run.times, run.states
-    if t.size == 0:
+    if run.times.size == 0:
         raise ValueError("plot: found a run without states, expected one with sample_times or "
                          "record_steps=True")
+    t, x = _curve(run)
     ax = pyplot.gca() if ax is None else ax
-    # No line is drawn across a reset.
-    jumps = np.flatnonzero(np.diff(t) == 0) + 1
-    t = np.insert(t, jumps, np.nan)
-    x = np.insert(x, jumps, np.nan, axis=0)
     marks = run.events if events else run.events[:0]
     components = range(x.shape[1]) if components is None else components
     labels = [f"x[{c}]" for c in components] if labels is None else labels

@@ -353,7 +353,11 @@ def test_pictures(tmp_path):
     from matplotlib import pyplot
     run = ricochet.integrate(Ball(), [1.0, 0.0], 2.0, record_steps=True)
     ax = ricochet.plot(run, labels=["height", "velocity"], ax=pyplot.subplots()[1])
-    assert np.isnan(ax.lines[0].get_xdata()).any()
+    t, height = ax.lines[0].get_data()
+    assert np.isnan(t).any()
+    # The flight after the first impact, which is one step: up to r^2 of the height.
+    first, second = run.events["t"][:2]
+    assert abs(np.nanmax(height[(t > first) & (t < second)]) - 0.25) < 0.01
     ricochet.plot(run, phase=(0, 1), ax=pyplot.subplots()[1])
     pyplot.close("all")
     with pytest.raises(ValueError, match="without states"):
