@@ -113,10 +113,10 @@ def _gate_verdict(trial):
     missed = (f"misses {trial.missed} of {trial.events} events (at most a share of "
               f"{trial.miss_bound:.1g} at 95 % confidence)")
     if gain > 1:
-        return (f"the guard is asked {gain:.2g} times less often than at every step, the network "
-                f"{trial.network_calls} times; it {missed}")
-    return (f"checking every step asks the guard less often, {trial.exact_calls} times instead of "
-            f"{trial.gated_calls}: the gate does not pay; it {missed}")
+        return (f"guard calls are {gain:.2g} times fewer than with a check at every step, at the "
+                f"price of {trial.network_calls} network calls; the gate {missed}")
+    return (f"a check at every step takes fewer guard calls, {trial.exact_calls} instead of "
+            f"{trial.gated_calls}: the gate saves nothing; it {missed}")
 
 
 def _certified(found):

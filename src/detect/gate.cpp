@@ -47,7 +47,8 @@ std::pair<std::string_view, double> call(std::string_view text, std::string_view
 
 void refuse(const Model& model, const std::string& what)
 {
-    throw std::invalid_argument(fmt::format("Gate: the model for {} {}", model.system, what));
+    const std::string system = model.system.empty() ? "a system without a name" : model.system;
+    throw std::invalid_argument(fmt::format("Gate: the model for {} {}", system, what));
 }
 
 bool checked_kind(const Model& model)

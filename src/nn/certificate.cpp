@@ -237,10 +237,12 @@ namespace {
 Certificate valid_certificate(const Model& model)
 {
     if (model.certificate.empty()) {
-        throw std::invalid_argument("CertifiedClassifier: the model has no certificate");
+        throw std::invalid_argument(
+            "Certified: the model has no certificate; `ricochet certify` or learn::certify makes "
+            "one");
     }
     if (const std::string why = why_void(model); !why.empty()) {
-        throw std::invalid_argument("CertifiedClassifier: the certificate is void: it " + why);
+        throw std::invalid_argument("Certified: the certificate is void: it " + why);
     }
     return parse_certificate(model.certificate);
 }

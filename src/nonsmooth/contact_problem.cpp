@@ -65,7 +65,9 @@ void ContactSolver::scale(const Eigen::MatrixXd& w, const Eigen::VectorXd& q,
 {
     if (components != 2 && components != 3) {
         throw std::invalid_argument(
-            fmt::format("ContactSolver: a contact has 2 or 3 components, got {}", components));
+            fmt::format("ContactSolver: a contact has 2 or 3 components, got {}: a normal one and "
+                        "1 or 2 tangents",
+                        components));
     }
     const auto n = static_cast<Eigen::Index>(friction.size()) * components;
     if (w.rows() != n || w.cols() != n || q.size() != n) {

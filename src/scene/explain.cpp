@@ -139,8 +139,10 @@ std::string explain(const Scene& scene, const SceneOptions& options)
     fmt::format_to(to, "skipped     {:.0f} of {:.0f} pairs: out of reach before t_end\n",
                    all - pairs, all);
     fmt::format_to(to, "alone       {} awake, no calendar\n", alone);
-    fmt::format_to(to, "impacts     {}; no set-valued code\n",
-                   options.impacts == ImpactLaw::waves ? "in waves" : "all of a cluster together");
+    fmt::format_to(
+        to, "impacts     {}; {}\n",
+        options.impacts == ImpactLaw::waves ? "in waves" : "all of a cluster together",
+        options.contacts ? "bodies in lasting contact by set-valued steps" : "no set-valued steps");
     fmt::format_to(to, "memory      {:.3g} MB without events and samples\n", scene.memory() * 1e-6);
     return fmt::to_string(out);
 }

@@ -26,7 +26,7 @@
 
 // Defined by the library's target.
 #ifndef RICOCHET_WITH_NONSMOOTH
-#error "ricochet: found event_hand_over.hpp; expected the target to link ricochet::nonsmooth"
+#error "ricochet: event_hand_over.hpp needs ricochet::nonsmooth, or RICOCHET_WITH_NONSMOOTH defined"
 #endif
 
 namespace ricochet {
