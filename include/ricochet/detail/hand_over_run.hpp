@@ -58,8 +58,8 @@ struct HandOverOptions {
     /// that its sign is due to rounding.
     bool until_released = false;
 
-    /// Options of the set-valued phases; their times are those of the run. A step of zero is a
-    /// thousandth of the run. Changes are located if the set is a box.
+    /// Options of the set-valued phases; times are those of the run, a step of 0 is a thousandth of
+    /// it. Changes are located for boxes of up to four reactions; for others see `switches`.
     SetValuedOptions set_valued{.step = 0, .scheme = {.first_stage = FirstStage::switch_aware}};
 
     std::vector<double> sample_times{};     ///< ascending
