@@ -43,7 +43,7 @@ struct OdeEngine {
     [[nodiscard]] Body read() const
     {
         Body at{read(body)};
-        for (const dBodyID other : others) at.others.push_back(read(other));
+        for (dBodyID other : others) at.others.push_back(read(other));
         return at;
     }
     void write(const Body& at) const
