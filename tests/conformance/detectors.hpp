@@ -334,8 +334,12 @@ TEST_P(DetectorSuite, ATouchIsFoundOrHonestlyAssumed)
             EXPECT_EQ(one.evidence, Evidence::assumed);
         }
     }
-    // A guard above its surface cannot touch it as a rising guard does.
-    EXPECT_FALSE(look(touch, Side::above, Crossing::rising).touch);
+    // A guard above its surface cannot touch it as a rising guard does, nor is that a crossing.
+    for (const Seen& one : {look(touch, Side::above, Crossing::rising),
+                            look(touch.times(-1), Side::below, Crossing::falling)}) {
+        EXPECT_FALSE(one.touch);
+        EXPECT_FALSE(one.hit);
+    }
 }
 
 TEST_P(DetectorSuite, AStartOnTheSurfaceIsJudgedByTheArmedSide)
