@@ -54,7 +54,7 @@ std::string first_meeting(const World& world, std::span<const std::uint32_t> gro
         }
     }
     if (a == none || first.value > world.options.t_end) return "";
-    return fmt::format("; on their present flights \"{}\" meets \"{}\" first, at t = {:.6g} s",
+    return fmt::format(R"(; on their present flights "{}" meets "{}" first, at t = {:.6g} s)",
                        world.scene.name_of(BodyId{a}), world.scene.name_of(BodyId{b}), first.value);
 }
 

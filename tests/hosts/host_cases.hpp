@@ -80,7 +80,8 @@ TYPED_TEST_P(InHost, PairsOfCrossingsAtACrestAreFound)
         ASSERT_EQ(result.events.size(), 6u) << "depth " << depth;
         EXPECT_TRUE(result.cuts.empty());
         for (std::size_t k = 0; k < 6; ++k) {
-            const double crest = std::numbers::pi * (0.5 + 2 * double(k / 2));
+            const std::size_t turns = k / 2;
+            const double crest = std::numbers::pi * (0.5 + 2 * double(turns));
             const double half = std::acos(1 - depth);
             const double expected = k % 2 == 0 ? crest - half : crest + half;
             EXPECT_NEAR(result.events[k].t, expected, 0.5 * half) << "depth " << depth;

@@ -79,7 +79,9 @@ struct StickSlip {
     {
         const double held = holding / belt;
         const double slipping = std::numbers::pi + 2 * std::atan(belt / (holding - sliding));
-        return held * (1 + k / 2) + slipping * ((k + 1) / 2);
+        const int sticks_before = 1 + k / 2;
+        const int slips_before = (k + 1) / 2;
+        return held * sticks_before + slipping * slips_before;
     }
 };
 

@@ -173,7 +173,8 @@ private:
     template <int k, int i>
     [[gnu::always_inline]] void keep_guard()
     {
-        constexpr int guard = tape.outputs[static_cast<std::size_t>(n + i)];
+        constexpr std::size_t output = std::size_t{n} + std::size_t{i};
+        constexpr int guard = tape.outputs[output];
         S value(0.0);
         if constexpr (k <= degree(guard)) value = c_[guard][k];
         guards_[k * m + i] = value;

@@ -31,7 +31,7 @@ inline constexpr int least_taylor_order = 12;
 {
     const auto bits = std::bit_cast<std::uint64_t>(x);
     const auto exponent = static_cast<double>(static_cast<std::int64_t>(bits >> 52) - 1023);
-    const double m =
+    const auto m =
         std::bit_cast<double>((bits & 0xfffffffffffffULL) | 0x3ff0000000000000ULL);  // in [1, 2)
     // Interpolates log2 at the four Chebyshev nodes of [1, 2].
     return (exponent - 2.1362320654130670) +

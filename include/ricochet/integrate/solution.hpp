@@ -107,6 +107,7 @@ public:
     {
         const auto all = [&](const std::vector<Other>& states) {
             std::vector<State> out;
+            out.reserve(states.size());
             for (const Other& state : states) out.push_back(convert(state));
             return out;
         };
