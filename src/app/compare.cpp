@@ -245,7 +245,7 @@ std::string_view reference(const SystemEntry& system)
 std::string times_table(const SystemEntry& system, const std::vector<double>& exact,
                         const std::vector<Method>& methods)
 {
-    constexpr int wide = 19;
+    constexpr int wide = 22;
     std::string labels = fmt::format("{:>3}{:>{}}", "", reference(system), wide);
     std::string steppings = fmt::format("{:>3}{:>{}}", "", "t [s]", wide);
     for (const Method& method : methods) {

@@ -255,6 +255,50 @@ TEST(TimeStepping, ARefusalSaysWhatIsWrongAndNamesTheContact)
                  "contact 0: friction must be finite, zero or positive, got inf");
 }
 
+/// A point above a roof with its ridge at x = 0, whose normal is multiplied by `factor`.
+struct Roof {
+    static constexpr int coordinates = 2;
+    static constexpr int contacts = 1;
+    static constexpr int tangents = 1;
+    using V = Eigen::Vector2d;
+    double factor = 1;
+    double size = 1;  ///< [m] of everything
+
+    void mass(const V&, Eigen::Matrix2d& m) const { m.setIdentity(); }
+    void force(double, const V&, const V&, V& f) const { f = {0, -9.81}; }
+    void gaps(const V& q, Eigen::Matrix<double, 1, 1>& g) const
+    {
+        g[0] = q[1] + std::abs(q[0]) + q[0] * q[0] / size;
+    }
+    void directions(const V& q, Eigen::Matrix2d& h) const
+    {
+        h << (q[0] < 0 ? -1 : 1) + 2 * q[0] / size, 1, 0, 0;
+        h *= factor;
+    }
+    [[nodiscard]] double restitution(int) const { return 0.5; }
+    [[nodiscard]] double friction(int) const { return 0; }
+};
+
+TEST(TimeStepping, RefusesADirectionThatIsNotTheGradientOfItsGap)
+{
+    const auto start = [](const Roof& roof, const Roof::V& q) {
+        return refusal([&] {
+            TimeStepping<Roof>(roof, q * roof.size, {0, 0}, {.t_end = 1, .step = 0.1});
+        });
+    };
+    for (const double size : {1e-6, 1.0, 1e6}) {
+        for (const double x : {-3.0, -1e-4, 0.0, 0.5}) {  // the ridge has two gradients
+            EXPECT_EQ(start({.size = size}, {x, 1}), "accepted") << size << ' ' << x;
+        }
+        EXPECT_NE(start({.factor = -1, .size = size}, {0.5, 1}), "accepted") << size;
+        EXPECT_NE(start({.factor = 2, .size = size}, {0.5, 1}), "accepted") << size;
+    }
+    EXPECT_EQ(start({.factor = -1}, {0.5, 1}),
+              "contact 0: the first row of its directions must be the gradient of its gap, about "
+              "(2, 1), got (-2, -1)");
+    EXPECT_EQ(start({.factor = std::nan("")}, {0.5, 1}), "accepted");  // the run reports it
+}
+
 TEST(TimeStepping, RefusesAStartInsideAnObstacleAndWrongCoefficients)
 {
     const auto start = [](double height, double e) {

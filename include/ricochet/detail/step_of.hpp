@@ -50,11 +50,7 @@ struct StepOf {
                   "use a one-step method");
 
     static constexpr bool ours = Departing<Stepper>;
-    /// The compiler keeps a small state that nothing else refers to in registers from stage to
-    /// stage.
-    static constexpr bool in_registers = fits_registers<X>;
-    static_assert(in_registers || !ours, "the library has the kernels of large states");
-    using Y = X;  ///< the type with which a step is computed
+    static_assert(fits_registers<X> || !ours, "the library has the kernels of large states");
 
     [[nodiscard]] static auto& at(void* door) noexcept
     {
@@ -64,11 +60,11 @@ struct StepOf {
     using Caller = FlowCaller<C>;
 
     /// The flow at (t, x). Registers hold what no call can reach: it gets copies.
-    [[gnu::always_inline]] static bool call(const Caller& caller, double t, const Y& x, Y& dxdt)
+    [[gnu::always_inline]] static bool call(const Caller& caller, double t, const X& x, X& dxdt)
     {
         if constexpr (ours) {
-            const Y there = x;
-            Y rate = x;
+            const X there = x;
+            X rate = x;
             const bool fits = call_by_reference(caller, t, there, rate);
             dxdt = rate;
             return fits;
@@ -76,8 +72,8 @@ struct StepOf {
             return call_by_reference(caller, t, x, dxdt);
         }
     }
-    [[gnu::always_inline]] static bool call_by_reference(const Caller& caller, double t, const Y& x,
-                                                         Y& dxdt)
+    [[gnu::always_inline]] static bool call_by_reference(const Caller& caller, double t, const X& x,
+                                                         X& dxdt)
     {
         [[maybe_unused]] void* const door = caller.door;
         [[maybe_unused]] const Mode mode = caller.mode;
@@ -109,8 +105,8 @@ struct StepOf {
               rate1(zero)
         {
         }
-        Y x0, rate0, remainder, zero;
-        Y room, w, w_rate, error, x1, rate1;
+        X x0, rate0, remainder, zero;
+        X room, w, w_rate, error, x1, rate1;
     };
 
     /// Computes the departure w after a step of length s, with its rate there and the error
@@ -118,10 +114,10 @@ struct StepOf {
     template <bool with_error, class Kept>
     [[gnu::always_inline]] static void depart(Caller& caller, Kept&& kept, double s, Values& of)
     {
-        Y& w = of.w;
-        Y& rate = of.w_rate;
-        Y& error = of.error;
-        const auto flow = [&](const auto& departure, Y& departure_rate, double offset)
+        X& w = of.w;
+        X& rate = of.w_rate;
+        X& error = of.error;
+        const auto flow = [&](const auto& departure, X& departure_rate, double offset)
             __attribute__((always_inline))
         {
             for_each_component(of.x0, [&](auto i) {
@@ -138,7 +134,7 @@ struct StepOf {
             }
         };
         if constexpr (ours) {
-            RungeKutta<typename Stepper::Coefficients, Y>::template depart<with_error>(
+            RungeKutta<typename Stepper::Coefficients, X>::template depart<with_error>(
                 flow, of.zero, s, kept, w, rate, error);
         } else if constexpr (is_fsal<Stepper> && with_error) {
             kept.do_step(flow, of.zero, of.zero, 0.0, w, rate, s, error);

@@ -25,6 +25,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -54,6 +55,15 @@ namespace detail {
 /// Validates a contact. @throws std::invalid_argument, naming the contact, if a coefficient is out
 /// of range, or if the gap is NaN or below -`room` [m].
 void check_contact(int contact, double restitution, double friction, double gap, double room);
+
+/// Validates the first row of `directions` for a contact, `row`, against the gradient of its gap in
+/// the position q. Of differences over several lengths one has to agree, since a gap may be curved
+/// over any length; at a kink the row may lie between the slopes on its sides.
+///
+/// @param gap  of the contact in a position [m]
+/// @throws std::invalid_argument, naming the contact, if none agrees.
+void check_direction(int contact, const Eigen::VectorXd& row, const Eigen::VectorXd& q,
+                     const std::function<double(const Eigen::VectorXd&)>& gap);
 
 }  // namespace detail
 
@@ -218,6 +228,11 @@ AnyTimeStepping<N>::AnyTimeStepping(const AnyMechanism<N>& system, const Vector&
     if (!mass_.allFinite() || Eigen::LLT<Square>(mass_).info() != Eigen::Success) {
         refuse_inclusion("the mass matrix is not positive definite");
     }
+    system_->directions(q, directions_);
+    for (int c = 0; c < system_->contacts; ++c) {
+        check_direction(c, directions_.row(c * system_->components), q,
+                        [&](const Eigen::VectorXd& at) { return system_->gap(c, at); });
+    }
     friction_.reserve(static_cast<std::size_t>(system.contacts));
     closed_.reserve(static_cast<std::size_t>(system.contacts));
     restart(options.t_start, q, v);
@@ -280,8 +295,8 @@ public:
     using Impulses = Eigen::Matrix<double, C * D, 1>;
 
     /// @throws std::invalid_argument for invalid options, a matrix that is not positive definite,
-    /// coefficients out of range, or a start that is not finite or inside an obstacle by more than
-    /// rounding.
+    /// coefficients out of range, a start that is not finite or inside an obstacle by more than
+    /// rounding, or a direction that is not the gradient of its gap there.
     TimeStepping(const System& system, const Vector& q, const Vector& v,
                  const TimeSteppingOptions& options)
         : TimeStepping::AnyTimeStepping(detail::TypedMechanism<System>(system), q, v, options)
