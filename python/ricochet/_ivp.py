@@ -10,7 +10,7 @@ from ._compiled import Compiled
 from ._network import set_gate
 from ._ready import Ready
 from ._run import Kind, numbers_from, set_mode, set_tolerance, source_of, state_from
-from ._system import Guard, System
+from ._system import MOST_EVENTS, Guard, System
 
 _METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78", "Taylor": "taylor"}
 _WITHOUT = {
@@ -298,10 +298,10 @@ def _guards(events, t0, start, args):
         terminal = getattr(event, "terminal", False)
         terminal = 0 if terminal is None else terminal
         if not isinstance(terminal, (bool, np.bool_)) and not _is_number(terminal) or (
-                int(terminal) != terminal or terminal < 0):
+                not 0 <= terminal <= MOST_EVENTS or int(terminal) != terminal):
             raise ValueError(f"{who}.terminal: found {terminal!r}, expected a bool or a whole "
-                             "number")
-        if not _is_number(direction):
+                             f"number up to {MOST_EVENTS}")
+        if not _is_number(direction) or direction != direction:
             raise TypeError(f"{who}.direction: found {direction!r}, expected a number")
         reset = getattr(event, "reset", None)
         unilateral = bool(getattr(event, "unilateral", False))

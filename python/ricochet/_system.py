@@ -2,11 +2,15 @@
 
 from bisect import bisect_left, bisect_right
 from math import inf
+from numbers import Real
 from types import MethodType
 
 from . import _ricochet
 from ._compiled import Compiled
 from ._formula import Formula
+
+#: The largest number of events after which a guard can end the run.
+MOST_EVENTS = 2**32 - 1
 
 
 class Guard:
@@ -115,12 +119,15 @@ class Guard:
             if isinstance(out["in_modes"], str):
                 out["in_modes"] = [out["in_modes"]]
             out["in_modes"] = list(out["in_modes"])
-        for what in ("degree", "stop_after"):
+        for what, most in (("degree", 2**31 - 1), ("stop_after", MOST_EVENTS)):
             if out[what] == 0:
                 continue
-            if out[what] != int(out[what]) or out[what] < 0:
+            if not isinstance(out[what], Real) or not 0 <= out[what] <= most or (
+                    out[what] != int(out[what])):
                 raise ValueError(f"guard {out['name']}: {what}: found {out[what]!r}, expected a "
-                                 "whole number that is not negative")
+                                 f"whole number that is not negative, and at most {most}")
+        if out["direction"] != out["direction"]:
+            raise ValueError(f"guard {out['name']}: direction: found nan, expected -1, 0 or 1")
         return out
 
     def __repr__(self):

@@ -129,7 +129,12 @@ def marked(**attributes):
     ({"events": [decay, 3]}, TypeError, r"events\[1\]: found a int, expected a function \(t, y\)"),
     ({"events": marked(terminal="x")}, ValueError, r"events\[0\].terminal: found 'x'"),
     ({"events": marked(terminal=-1)}, ValueError, r"events\[0\].terminal: found -1"),
+    ({"events": marked(terminal=2**32 + 1)}, ValueError,
+     r"events\[0\].terminal: found 4294967297, expected .* up to 4294967295"),
+    ({"events": marked(terminal=math.inf)}, ValueError, r"events\[0\].terminal: found inf"),
+    ({"events": marked(terminal=math.nan)}, ValueError, r"events\[0\].terminal: found nan"),
     ({"events": marked(direction="x")}, TypeError, r"events\[0\].direction: found 'x'"),
+    ({"events": marked(direction=math.nan)}, TypeError, r"events\[0\].direction: found nan"),
     ({"events": lambda t, y: "a"}, TypeError, r"^events\[0\] returned str, expected a number"),
     ({"t_span": (0, math.inf)}, ValueError, r"solve_ivp: t_span\[1\] must be a finite time"),
     ({"y0": [math.nan]}, ValueError, "solve_ivp: y0 must be finite"),
@@ -272,6 +277,17 @@ def test_events_that_return_arrays_of_one_and_truths():
     assert result.t_events[0] == pytest.approx([0.5])
     assert result.t_events[1] == pytest.approx([0.75])
     assert result.t_events[2] == pytest.approx([0.75])
+
+
+@pytest.mark.parametrize("arguments, words", [
+    ({"stop_after": 2**32 + 1}, "stop_after: found 4294967297, .* at most 4294967295"),
+    ({"stop_after": math.nan}, "stop_after: found nan"), ({"stop_after": "3"}, "found '3'"),
+    ({"degree": 2**32 + 1}, "degree: found 4294967297, .* at most 2147483647"),
+    ({"direction": math.nan}, "direction: found nan, expected -1, 0 or 1")])
+def test_arguments_of_guards_that_are_none(arguments, words):
+    guard = ricochet.Guard(lambda t, x: x[0] - 0.5, name="level", **arguments)
+    with pytest.raises(ValueError, match=words):
+        ricochet.integrate(ricochet.System(decay, [guard]), [1.0], 1.0)
 
 
 def test_modes_that_there_are_not():
