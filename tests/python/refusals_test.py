@@ -283,11 +283,20 @@ def test_events_that_return_arrays_of_one_and_truths():
     ({"stop_after": 2**32 + 1}, "stop_after: found 4294967297, .* at most 4294967295"),
     ({"stop_after": math.nan}, "stop_after: found nan"), ({"stop_after": "3"}, "found '3'"),
     ({"degree": 2**32 + 1}, "degree: found 4294967297, .* at most 2147483647"),
-    ({"direction": math.nan}, "direction: found nan, expected -1, 0 or 1")])
+    ({"direction": math.nan}, "direction: found nan, expected -1, 0 or 1"),
+    ({"in_modes": [0]}, "guard level: found in_modes, expected none in a system without modes")])
 def test_arguments_of_guards_that_are_none(arguments, words):
     guard = ricochet.Guard(lambda t, x: x[0] - 0.5, name="level", **arguments)
     with pytest.raises(ValueError, match=words):
         ricochet.integrate(ricochet.System(decay, [guard]), [1.0], 1.0)
+
+
+@pytest.mark.parametrize("modes, words", [
+    (["on", "on"], r"modes: found \['on', 'on'\], expected each of them once"),
+    ([1, True], "expected each of them once"), (0, "modes: found none"), ([], "modes: found none")])
+def test_modes_that_cannot_be_told_apart(modes, words):
+    with pytest.raises(ValueError, match=words):
+        ricochet.integrate(ricochet.System(lambda mode, t, x: -x, modes=modes), [1.0], 1.0)
 
 
 def test_modes_that_there_are_not():

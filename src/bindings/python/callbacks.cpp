@@ -99,6 +99,7 @@ CallbackSource::CallbackSource(PyObject* specification)
     moded_ = mode_list_.get() != Py_None;
     if (moded_) {
         mode_count_ = static_cast<std::size_t>(PyList_GET_SIZE(mode_list_.get()));
+        if (mode_count_ == 0) raise(PyExc_ValueError, "modes: found none, expected at least one");
         mode_numbers_ = checked(PyDict_New());
         for (std::size_t i = 0; i < mode_count_; ++i) {
             const Ref number = checked(PyLong_FromSize_t(i));
@@ -107,6 +108,11 @@ CallbackSource::CallbackSource(PyObject* specification)
                                number.get()) != 0) {
                 throw PythonError();
             }
+        }
+        if (PyDict_Size(mode_numbers_.get()) != PyList_GET_SIZE(mode_list_.get())) {
+            const Ref text = checked(PyObject_Repr(mode_list_.get()));
+            raise(PyExc_ValueError, std::string("modes: found ") + PyUnicode_AsUTF8(text.get()) +
+                                        ", expected each of them once");
         }
     } else {
         mode_list_ = Ref();
@@ -175,6 +181,11 @@ void CallbackSource::read_guard(PyObject* specification)
         .touch = number_in(specification, "touch", 0)};
     const Ref modes = item(specification, "in_modes");
     if (modes.get() == Py_None) return;
+    if (!moded_) {
+        raise(PyExc_ValueError, guard.title +
+                                    ": found in_modes, expected none in a system "
+                                    "without modes");
+    }
     guard.in_mode.assign(mode_count_, false);
     for (Py_ssize_t i = 0; i < PyList_GET_SIZE(modes.get()); ++i) {
         PyObject* number =
