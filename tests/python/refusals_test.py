@@ -135,6 +135,8 @@ def marked(**attributes):
     ({"events": marked(terminal=math.nan)}, ValueError, r"events\[0\].terminal: found nan"),
     ({"events": marked(direction="x")}, TypeError, r"events\[0\].direction: found 'x'"),
     ({"events": marked(direction=math.nan)}, TypeError, r"events\[0\].direction: found nan"),
+    ({"events": lambda t, y: np.complex64(y[0] - 0.5)}, TypeError,
+     r"^events\[0\] returned numpy.complex64, expected a number"),
     ({"events": lambda t, y: "a"}, TypeError, r"^events\[0\] returned str, expected a number"),
     ({"t_span": (0, math.inf)}, ValueError, r"solve_ivp: t_span\[1\] must be a finite time"),
     ({"y0": [math.nan]}, ValueError, "solve_ivp: y0 must be finite"),

@@ -36,7 +36,8 @@ double as_guard(PyObject* result, const std::string& who)
     if (PyFloat_Check(result)) return PyFloat_AS_DOUBLE(result);
     if (PyBool_Check(result)) return result == Py_True ? 1 : -1;
     if (PyArray_IsScalar(result, Bool)) return PyObject_IsTrue(result) ? 1 : -1;
-    if (!PyComplex_Check(result) && result != Py_None) {
+    if (!PyComplex_Check(result) && !PyArray_IsScalar(result, ComplexFloating) &&
+        result != Py_None) {
         const double number = PyFloat_AsDouble(result);
         if (number != -1 || !PyErr_Occurred()) return number;
         if (!PyErr_ExceptionMatches(PyExc_TypeError) && !PyErr_ExceptionMatches(PyExc_ValueError)) {
