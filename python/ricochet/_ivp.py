@@ -186,6 +186,10 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         source = _ricochet.callback_system(dict(
             name="solve_ivp", flow=fun, flow_title="fun", args=args, guards=guards))
     if t0 == t1:
+        if not np.isfinite(t0):
+            raise ValueError(f"t_span: found {t_span!r}, expected finite times")
+        if not np.all(np.isfinite(start)):
+            raise ValueError(f"y0: found {y0!r}, expected finite numbers")
         return _nothing(t0, start, samples, dense_output, count if watched else None)
     events_given = not isinstance(fun, (System, Ready))
     try:

@@ -137,6 +137,8 @@ def marked(**attributes):
     ({"events": marked(direction=math.nan)}, TypeError, r"events\[0\].direction: found nan"),
     ({"events": lambda t, y: np.complex64(y[0] - 0.5)}, TypeError,
      r"^events\[0\] returned numpy.complex64, expected a number"),
+    ({"t_span": (math.inf, math.inf)}, ValueError, "t_span: found .*, expected finite times"),
+    ({"t_span": (1, 1), "y0": [math.nan]}, ValueError, "y0: found .*, expected finite numbers"),
     ({"events": lambda t, y: "a"}, TypeError, r"^events\[0\] returned str, expected a number"),
     ({"t_span": (0, math.inf)}, ValueError, r"solve_ivp: t_span\[1\] must be a finite time"),
     ({"y0": [math.nan]}, ValueError, "solve_ivp: y0 must be finite"),
