@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <concepts>
 #include <functional>
+#include <limits>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -209,8 +211,20 @@ std::shared_ptr<Source> ready_system(std::string_view name, std::span<const doub
 std::vector<double> closed_form(const Source& system, std::string_view what,
                                 std::span<const double> arguments)
 {
+    for (const double argument : arguments) {
+        if (std::isfinite(argument)) continue;
+        throw std::invalid_argument(std::string(what) + ": found " + std::to_string(argument) +
+                                    ", expected finite numbers");
+    }
     const auto argument = [&](std::size_t i) { return i < arguments.size() ? arguments[i] : 0; };
-    const auto count = [&](std::size_t i) { return static_cast<int>(argument(i)); };
+    const auto count = [&](std::size_t i) {
+        const double n = argument(i);
+        if (n >= 0 && n <= std::numeric_limits<int>::max() && n == std::floor(n)) {
+            return static_cast<int>(n);
+        }
+        throw std::invalid_argument(std::string(what) + ": found n = " + std::to_string(n) +
+                                    ", expected a whole number that is not negative");
+    };
     if (const auto* ball = as<BouncingBall>(system)) {
         if (what == "impact_time") return {ball->impact_time(count(0), argument(1), argument(2))};
         if (what == "zeno_time") return {ball->zeno_time(argument(0), argument(1))};
