@@ -15,7 +15,8 @@ def _curve(run):
         for left, right in zip(ends[:-1], ends[1:]):
             inside = np.linspace(left, right, fewest + int(500 * abs(right - left) / span))
             times.append(inside)
-            states.append(np.hstack([solution(inside[:-1]), solution.before(inside[-1:])]))
+            end = solution.before if right != left else solution
+            states.append(np.hstack([solution(inside[:-1]), end(inside[-1:])]))
         t, x = np.concatenate(times), np.concatenate(states, axis=1).T
     moved = np.any(np.diff(x, axis=0) != 0, axis=1)
     jumps = np.flatnonzero((np.diff(t) == 0) & moved) + 1

@@ -459,6 +459,12 @@ private:
         }
     }
 
+    /// Adds the present state to the solution, kept for a length of time [s], which may be zero.
+    void record_place(double length);
+
+    /// Adds the state after resets at the end of the run, from where no further step starts.
+    void record_end();
+
     [[nodiscard]] bool lies_before(double t, double end) const noexcept
     {
         return backward_ ? t > end : t < end;

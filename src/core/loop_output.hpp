@@ -27,6 +27,24 @@ inline void Loop<X, single>::emit_held_samples(double until)
 }
 
 template <class X, bool single>
+inline void Loop<X, single>::record_place(double length)
+{
+    X zero = step_.x0();
+    for_each_component(zero, [&](auto i) { zero[i] = 0; });
+    const DenseParts<X> parts{.h = length, .x0 = &step_.x0(), .remainder = &zero, .rate0 = &zero};
+    run_.solution.add(step_.time(0), backward_, step_.mode(), parts, length);
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::record_end()
+{
+    if (run_.solution.empty()) return;
+    const bool complete =
+        same_state(run_.solution(run_.t), run_.x) && run_.solution.mode(run_.t) == run_.mode;
+    if (!complete) record_place(0);
+}
+
+template <class X, bool single>
 inline void Loop<X, single>::add_sample(X&& x)
 {
     run_.trajectory.t.push_back(options_.sample_times[next_sample_]);

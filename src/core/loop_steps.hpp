@@ -56,7 +56,10 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
     run_.statistics.resteps = step_.resteps();
     if (defers_) planner_->add_counts(run_.statistics);
     run_.statistics.disabled += std::exchange(search_.disabled, 0);
-    if (ended_) emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
+    if (ended_) {
+        emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
+        if (options_.record_steps) record_end();
+    }
     return run_;
 }
 
@@ -257,6 +260,7 @@ inline void Loop<X, single>::hold(double remaining)
         if (time_event_due_) until = time_event_;
     }
     emit_held_samples(until);
+    if (options_.record_steps) record_place(step_.until(until));
     step_.hold(until);
     if (time_event_due_) {
         step_.refresh();

@@ -1007,6 +1007,50 @@ TEST(Events, TheSolutionHasALimitOnEitherSideOfAnEvent)
     EXPECT_EQ(run.solution(3), run.x);
 }
 
+TEST(Events, TheSolutionEndsWithTheStateAfterTheLastReset)
+{
+    const BouncingBall ball;
+    const auto run =
+        integrate(ball, X{10, 0}, {.t_end = 3, .stop_at_event = true, .record_steps = true});
+    ASSERT_EQ(run.outcome, Outcome::stopped_by_event);
+    EXPECT_EQ(run.solution(run.t), run.x);
+    EXPECT_EQ(run.solution(run.t + 1), run.x);
+    EXPECT_LT(run.solution.before(run.t)[1], 0);
+    EXPECT_EQ(run.solution.time(run.solution.size()), run.t);
+}
+
+TEST(Events, TheSolutionKeepsTheStateOfAMotionAtRest)
+{
+    // At rest the ball is marked by its third component; at 5 s it is thrown up again.
+    struct Marked {
+        using State = std::array<double, 3>;
+        void flow(double /*t*/, const State& x, State& dxdt) const { dxdt = {x[1], -9.81, 0}; }
+        double guard(double /*t*/, const State& x) const { return x[0]; }
+        GuardInfo guard_info() const { return {.unilateral = true}; }
+        void reset(double /*t*/, State& x) const { x = {0, -0.5 * x[1], x[2]}; }
+        void rest(double /*t*/, State& x) const { x = {0, 0, x[2] + 1}; }
+        double next_time_event(double t) const
+        {
+            return t < 5 ? 5 : std::numeric_limits<double>::infinity();
+        }
+        void time_reset(double /*t*/, State& x) const { x[1] = 10; }
+    };
+    const auto run =
+        integrate(Marked{}, {1, 0, 0}, {.t_end = 20, .sample_times = {2, 4, 5, 6, 15, 20}});
+    const auto kept = integrate(Marked{}, {1, 0, 0}, {.t_end = 20, .record_steps = true});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.trajectory.t.size(), 6u);
+    for (std::size_t i = 0; i < 6; ++i) {
+        for (std::size_t c = 0; c < 3; ++c) {
+            EXPECT_NEAR(kept.solution(run.trajectory.t[i])[c], run.trajectory.x[i][c], 1e-12);
+        }
+    }
+    EXPECT_EQ(kept.solution.before(5), (Marked::State{0, 0, 1}));
+    EXPECT_EQ(kept.solution(5), (Marked::State{0, 10, 1}));
+    EXPECT_EQ(kept.solution(19), (Marked::State{0, 0, 2}));
+    EXPECT_EQ(kept.solution.time(kept.solution.size()), 20);
+}
+
 TEST(Events, TimeMayRunBackward)
 {
     // Back through the third impact of an inelastic ball that gains the energy it lost.

@@ -72,6 +72,25 @@ def test_a_ball_that_comes_to_rest():
     assert without.status == -1 and without.outcome == "zeno" and without.message
 
 
+def test_the_solution_has_the_state_after_a_last_reset_and_at_rest():
+    def event(t, y):
+        return y[0]
+
+    event.terminal = 2
+    event.unilateral = True
+    event.reset = lambda t, y: [0.0, -0.5 * y[1]]
+    result = ricochet.solve_ivp(lambda t, y: [y[1], -9.81], (0, 3), [1.0, 0.0], events=event,
+                                dense_output=True)
+    assert result.status == 1 and result.y[1, -1] > 0
+    np.testing.assert_array_equal(result.sol(result.t[-1]), result.y[:, -1])
+    event.terminal = False
+    event.rest = lambda t, y: [0.0, 0.0]
+    result = ricochet.solve_ivp(lambda t, y: [y[1], -9.81], (0, 3), [1.0, 0.0], events=event,
+                                dense_output=True)
+    np.testing.assert_array_equal(result.sol(2.5), [0, 0])
+    assert result.sol.t_max == 3
+
+
 def test_python_and_cpp_give_the_same_bits():
     # With the guard's rate in closed form, as in C++, both take the same steps.
     class Same(Ball):
