@@ -75,6 +75,7 @@ public:
         validate(request.options, false, "Monitor");
         request.options.t_end = sign_ * std::numeric_limits<double>::infinity();
         start_mode_ = source_->start_mode();
+        components_ = like.size();
         door_ = source_->open(like);
         // Guards see whole states: a host's interpolant need be no polynomial.
         table_ = door_->table();
@@ -92,6 +93,7 @@ public:
     {
         const Mode in = mode.is_none() ? start_mode_ : py::cast<Mode>(mode);
         return use([&] {
+            require_dimension("x", x);
             const State state = state_from(x);
             const std::optional<State> dxdt = rate_from("rate", rate, state.size());
             return monitor_->start(Instant{t}, state, dxdt ? dxdt->data() : nullptr, in, scale);
@@ -147,6 +149,7 @@ public:
                 const std::optional<State> dxdt = rate_from("rate", rate, monitor_->x().size());
                 return monitor_->resume(dxdt ? dxdt->data() : nullptr, scale);
             }
+            if (!after.is_none()) require_dimension("after", py::cast<Given>(after));
             const State state =
                 after.is_none() ? monitor_->x() : state_from(py::cast<Given>(after));
             const std::optional<State> dxdt = rate_from("rate", rate, state.size());
@@ -163,6 +166,7 @@ public:
     void skip_to(double t, const Given& x, const Given& rate)
     {
         use([&] {
+            require_size("x", x, monitor_->x().size());
             const State state = state_from(x);
             const std::optional<State> dxdt = rate_from("rate", rate, state.size());
             monitor_->skip_to(Instant{t}, state, dxdt->data());
@@ -273,6 +277,16 @@ private:
                               std::to_string(n) + ",)");
     }
 
+    /// Refuses a state of another dimension than that of the motion, unless the system may change
+    /// it.
+    void require_dimension(const char* name, const Given& x) const
+    {
+        const bool varies = table_.moded || table_.changes_dimension;
+        require_size(name, x, varies ? static_cast<std::size_t>(x.size()) : components_);
+        // A ready system or a formula refuses a state that is not its own.
+        if (varies) (void)source_->open(state_from(x));
+    }
+
     [[nodiscard]] static State state_from(const Given& x)
     {
         require_size("x", x, static_cast<std::size_t>(x.size()));
@@ -295,6 +309,7 @@ private:
     double sign_;
     PyRun names_;
     Mode start_mode_ = 0;
+    std::size_t components_ = 0;  ///< number of components of `like`
     std::unique_ptr<RunDoor> door_;
     detail::SystemTable<State> table_;
     OwnedSetup setup_;
