@@ -295,6 +295,21 @@ def test_arguments_of_guards_that_are_none(arguments, words):
         ricochet.integrate(ricochet.System(decay, [guard]), [1.0], 1.0)
 
 
+@pytest.mark.parametrize("result", [None, "", [], np.array([True, False])])
+def test_enabled_that_returns_something_else(result):
+    guard = ricochet.Guard(lambda t, x: x[0] - 0.5, name="level", enabled=lambda t, x: result)
+    with pytest.raises(TypeError, match="enabled of level returned .*, expected True or False"):
+        ricochet.integrate(ricochet.System(decay, [guard]), [1.0], 1.0)
+
+
+@pytest.mark.parametrize("result, events", [(True, 1), (0, 0), (np.bool_(True), 1),
+                                            (np.array([False]), 0)])
+def test_enabled_that_returns_any_truth(result, events):
+    guard = ricochet.Guard(lambda t, x: x[0] - 0.5, enabled=lambda t, x: result)
+    run = ricochet.integrate(ricochet.System(decay, [guard]), [1.0], 1.0)
+    assert len(run.events) == events
+
+
 @pytest.mark.parametrize("modes, words", [
     (["on", "on"], r"modes: found \['on', 'on'\], expected each of them once"),
     ([1, True], "expected each of them once"), (0, "modes: found none"), ([], "modes: found none")])

@@ -272,9 +272,13 @@ private:
         const CallbackGuard& guard = source_.guards_[which];
         if (!guard.enabled) return true;
         const Ref result = call(guard.enabled, mode, t, x_.show(x));
-        const int truth = PyObject_IsTrue(result.get());
-        if (truth < 0) throw PythonError();
-        return truth != 0;
+        // None is what a function without a return statement returns.
+        const int truth = PyNumber_Check(result.get()) ? PyObject_IsTrue(result.get()) : -1;
+        if (truth >= 0) return truth != 0;
+        if (PyErr_Occurred() && !PyErr_ExceptionMatches(PyExc_ValueError)) throw PythonError();
+        PyErr_Clear();
+        raise(PyExc_TypeError, "enabled of " + guard.owner + " returned " + type_of(result.get()) +
+                                   ", expected True or False");
     }
 
     template <Function CallbackGuard::*member>
