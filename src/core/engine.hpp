@@ -190,12 +190,13 @@ protected:
 
     /// Whether a crossing repeats the last event of the guard in the same direction. If the guard
     /// has not turned back since, it is the same crossing, found again because the reset moved the
-    /// state by a rounding; otherwise it is a new event, and events accumulate.
+    /// state by a rounding; otherwise it is a new event, and events accumulate. A guard that has
+    /// been on its other side in between repeats nothing, unless the two cannot be told apart.
     [[nodiscard]] bool repeats(std::size_t i, double t) const noexcept
     {
         const GuardRecord& record = bank_[i];
-        return record.side == record.last_side &&
-               std::fabs(t - record.last) <= resolution_.window(t);
+        const double reach = record.returned ? resolution_.blur(t) : resolution_.window(t);
+        return record.side == record.last_side && std::fabs(t - record.last) <= reach;
     }
 
     [[nodiscard]] bool turned_back(std::size_t i) const noexcept

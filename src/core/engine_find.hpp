@@ -137,6 +137,8 @@ inline void EventEngine<X, single>::dismiss_members()
     for (std::size_t k = 0; k < fired.size(); ++k) {
         const std::size_t i = fired[k];
         const double t = step_.time(search_.at());
+        const Side side = search_.side_left(i);
+        if (bank_[i].side != side) bank_.arm(i, side);
         if (!system_.enabled_at(i, step_.mode(), t, search_.before())) {
             ++run_.statistics.disabled;
         } else if (repeats(i, t) && !bank_[i].info.unilateral && !turned_back(i)) {

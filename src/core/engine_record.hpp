@@ -86,6 +86,7 @@ inline void EventEngine<X, single>::count_event(std::size_t i, double t, Side si
     ++record.events;
     record.last = t;
     record.last_side = side;
+    record.returned = false;
 }
 
 template <class X, bool single>
@@ -151,6 +152,7 @@ inline void EventEngine<X, single>::record_notes(double s)
         const double t = backward_ ? std::max(step_.time(note.where.root), latest)
                                    : std::min(step_.time(note.where.root), latest);
         count_event(note.guard, t, note.side);
+        bank_[note.guard].returned = note.kind == EventKind::touch;
         if (!options_.record_events) continue;
         Event<X> event{.t = t,
                        .kind = note.kind,

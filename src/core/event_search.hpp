@@ -98,6 +98,15 @@ public:
         return hits_[0].where;
     }
 
+    /// Side that a guard of the set leaves. Within the step it may have come there from the other.
+    [[nodiscard]] Side side_left(std::size_t guard) noexcept
+    {
+        for (const Hit& hit : hits_) {
+            if (hit.guard == guard) return hit.side;
+        }
+        return hits_[0].side;
+    }
+
     /// Finds the first set of acting guards in the step; a time event that is due at
     /// its end belongs to it if it lies in the window. False: none.
     [[nodiscard]] bool find_set(const CurrentStep& step, Bank& bank,

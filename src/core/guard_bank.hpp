@@ -224,7 +224,9 @@ public:
 
     void arm(std::size_t i, Side side) noexcept
     {
-        records_[i].side = side;
+        GuardRecord& record = records_[i];
+        if (side == record.last_side && record.side == opposite(side)) record.returned = true;
+        record.side = side;
         sign_[i] = records_[i].enabled && !records_[i].deferred ? sign_of(side) : 0;
         as_screened_ = false;
     }
@@ -341,6 +343,7 @@ public:
             visit(record.events);
             visit(record.last);
             visit(record.last_side);
+            visit(record.returned);
             visit(record.band);
             visit(record.turned);
             visit(record.departs);

@@ -88,6 +88,7 @@ struct GuardRecord {
     std::uint64_t events = 0;
     double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
     Side last_side = Side::plateau;                          ///< the side it left then
+    bool returned = false;  ///< it has come back to that side from the other one
     ShrinkingIntervals intervals;
 };
 

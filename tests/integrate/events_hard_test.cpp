@@ -339,6 +339,37 @@ TEST(HardEvents, AGuardAfterTheWindowOfASetKeepsItsOwnTime)
     }
 }
 
+/// A guard that swings about its surface, and a reset that counts its events.
+struct Swinging {
+    static constexpr double frequency = 100;  ///< [rad/s]
+    Crossing counted = Crossing::falling;
+    [[nodiscard]] GuardInfo guard_info() const { return {.crossing = counted}; }
+    void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
+    [[nodiscard]] double guard(double t, const X&) const { return std::sin(frequency * t + 0.5); }
+    void reset(double, X& x) const { ++x[1]; }
+};
+
+TEST(HardEvents, AGuardThatSwingsBackAndCrossesAgainInTheWindowHasANewEvent)
+{
+    for (const Crossing counted : {Crossing::falling, Crossing::rising, Crossing::either}) {
+        // It falls through zero at odd multiples of pi, and rises at even ones; 63 within 2 s.
+        const std::size_t events = counted == Crossing::falling  ? 32
+                                   : counted == Crossing::rising ? 31
+                                                                 : 63;
+        for (const double step : {0.01, 0.05, 0.1, 0.2}) {
+            for (const double window : {0.0, 0.1, 1.0}) {
+                const auto run = integrate(Swinging{counted}, X{0, 0},
+                                           {.t_end = 2, .step = step, .event_window = window},
+                                           FixedStep<Rk4>{});
+                EXPECT_EQ(run.outcome, Outcome::reached_end) << step << ", " << window;
+                EXPECT_EQ(run.events.size(), events) << step << ", " << window;
+                EXPECT_EQ(run.x[1], static_cast<double>(events)) << step << ", " << window;
+                EXPECT_EQ(run.statistics.suppressed, 0u) << step << ", " << window;
+            }
+        }
+    }
+}
+
 /// Passes given times, each an event of the same guard.
 struct Train {
     std::vector<double> times;
