@@ -46,13 +46,17 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
         jump_lost = record.intervals.jump_is_lost(away, std::max(rounding, soon));
         // A guard farther away than an error of location explains does not fade, rising or not.
         // Without a location the reset of another guard may carry it across its surface.
-        if ((located_ ? away : std::fabs(away)) > 1024 * rounding) {
+        const double beyond = located_ ? -away - 2 * record.band : -away;
+        if (std::max(away, beyond) > 1024 * rounding) {
             record.turned = away > 0;
             return false;
         }
     } else {
         record.intervals.forget_jumps();
     }
+    // Excursions are not lost in rounding where the guard came from far away, as from where a time
+    // event had put it.
+    const bool came_far = low && std::fabs(bank_.g0(i)) > 1024 * rounding;
     bool lost = false;
     if (!system_->rated) {
         if (low) {
@@ -63,6 +67,7 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
             }
             // A difference of a unit in the last place does not determine the direction.
             lost = std::fabs(rate) * part <= rounding / 8;
+            if (lost && came_far && !jump_lost && stands_still(i, part, rounding)) return false;
             if (lost) rate = 0;
         }
     }
@@ -71,7 +76,21 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
     record.turned = lost || sign_of(record.last_side) * rate > 0;
     if (record.turned) record.intervals.depart(rate, low);
     if (jump_lost && located_ && (lost || !record.turned)) return true;
-    return low && record.intervals.fades(rounding);
+    return low && !came_far && record.intervals.fades(rounding);
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::stands_still(std::size_t i, double ahead, double rounding)
+{
+    X& later = resets_.after();
+    X& rate_later = resets_.scratch();
+    assign(later, step_.x0());
+    assign(rate_later, step_.x0());
+    move(later, step_.x0(), ahead, step_.rate0());
+    step_.flow(ahead, later, rate_later);
+    const double rate = bank_.view(i, step_.mode(), calls())
+                            .rate(step_.time(ahead), later, rate_later, 1e5 * ahead);
+    return std::fabs(rate) * ahead <= rounding / 8;
 }
 
 template <class X, bool single>

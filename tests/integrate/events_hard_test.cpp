@@ -370,6 +370,35 @@ TEST(HardEvents, AGuardThatSwingsBackAndCrossesAgainInTheWindowHasANewEvent)
     }
 }
 
+/// A tank that fills, is closed when it is full, and is emptied every 2 s.
+struct Tank {
+    enum : Mode { fills, closed };
+    double level = 1;  ///< at which the reset leaves it
+    void flow(Mode mode, double, const X&, X& dxdt) const { dxdt = {mode == fills ? 1.0 : 0.0, 0}; }
+    [[nodiscard]] double guard(Mode, double, const X& x) const { return 1 - x[0]; }
+    [[nodiscard]] Mode reset(Mode, double, X& x) const
+    {
+        x = {level, x[1] + 1};
+        return closed;
+    }
+    [[nodiscard]] double next_time_event(double t) const { return 2 * std::floor(t / 2) + 2; }
+    [[nodiscard]] Mode time_reset(Mode, double, X& x) const
+    {
+        x[0] = 0;
+        return fills;
+    }
+};
+
+TEST(HardEvents, AGuardThatItsResetHoldsStillDoesNotAccumulate)
+{
+    for (const double level : {0.9, 1.0, 1.2}) {
+        const auto run = integrate(Tank{level}, X{0, 0}, {.t_end = 100});
+        EXPECT_EQ(run.outcome, Outcome::reached_end) << level;
+        EXPECT_EQ(run.x[1], 50) << level;
+        EXPECT_EQ(run.events.size(), 100u) << level;
+    }
+}
+
 /// Passes given times, each an event of the same guard.
 struct Train {
     std::vector<double> times;
