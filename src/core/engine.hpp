@@ -462,6 +462,7 @@ protected:
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
+    std::size_t stopper_ = no_guard;  ///< the guard of the set that ends the run
     bool asked_ = false;        ///< the network has been asked about the current step
     bool cuts_at_all_ = false;  ///< guards without a reset cut the step, too
     MergedResets<X> resets_;

@@ -36,7 +36,7 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
     }
     step_.restart(at, resets_.after(), resets_.mode());
     if (on_time) step_.hold(t);
-    if (stops_) return end(Outcome::stopped_by_event, first_fired());
+    if (stops_) return end(Outcome::stopped_by_event, stopper_);
     pending_ = Pending::settle;
 }
 

@@ -93,6 +93,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::record_time_event(double t)
 {
     stops_ = options_.stop_at_event;
+    stopper_ = no_guard;
     ++run_.statistics.events;
     record({.t = t,
             .kind = EventKind::time,
@@ -108,7 +109,9 @@ inline void EventEngine<X, single>::record_time_event(double t)
 template <class X, bool single>
 inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, bool located)
 {
-    stops_ = (stops_ && i != first_fired()) || ends_run(i);
+    const bool stops = stops_ && i != first_fired();
+    if (!stops) stopper_ = i;
+    stops_ = stops || ends_run(i);
     // At the start of a step the guard has been armed on the side to which it has been carried.
     const Side side = bank_[i].side;
     count_event(i, t, located ? side : opposite(side));

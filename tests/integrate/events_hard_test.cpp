@@ -399,6 +399,30 @@ TEST(HardEvents, AGuardThatItsResetHoldsStillDoesNotAccumulate)
     }
 }
 
+/// Falls from 1 with the speed 1; guard 0 throws it back to 1 at zero, and guard 1, with the same
+/// surface, ends the run.
+struct Stopped {
+    static constexpr std::size_t guard_count = 2;
+    Crossing counted = Crossing::falling;
+    std::size_t stop_after = 1;
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        if (which == 0) return {};
+        return {.crossing = counted, .resets = false, .stop_after = stop_after};
+    }
+    void flow(double, const X1&, X1& dxdt) const { dxdt = {-1}; }
+    [[nodiscard]] double guard(std::size_t, double, const X1& x) const { return x[0]; }
+    void reset(std::size_t, double, X1& x) const { x = {1}; }
+};
+
+TEST(HardEvents, TheGuardThatEndsARunIsNamedAmongThoseThatFire)
+{
+    const auto run = integrate(Stopped{.stop_after = 2}, X1{1}, {.t_end = 10});
+    EXPECT_EQ(run.outcome, Outcome::stopped_by_event);
+    EXPECT_EQ(run.guard, 1u);
+    EXPECT_NEAR(run.t, 2, 1e-14);
+}
+
 /// Passes given times, each an event of the same guard.
 struct Train {
     std::vector<double> times;
