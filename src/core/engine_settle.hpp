@@ -169,7 +169,11 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
         side != Side::plateau && side == opposite(before) && counts(before, record.info.crossing);
     const bool pressed = kept_out && on_surface;
     const bool arrived = on_surface && counts(opposite(side), record.info.crossing);
-    const bool fires = record.fired           ? pressed
+    // A fired guard without a reset may have been carried back by the reset of another.
+    const Side at_set = located_ ? opposite(before) : before;
+    const bool carried_back = !(resets_any_ && record.info.resets) && !on_surface &&
+                              side == opposite(at_set) && counts(at_set, record.info.crossing);
+    const bool fires = record.fired           ? pressed || carried_back
                        : record.newly_enabled ? record.acting && (arrived || pressed)
                                               : flipped;
     if (fires && counts_here(i)) {
