@@ -24,6 +24,14 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         GuardRecord& record = bank_[i];
         if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;
         const GuardSample at = search_.sample_at_set(step_, bank_, i, calls());
+        constexpr double epsilon = std::numeric_limits<double>::epsilon();
+        const double ulp = epsilon * std::fabs(step_.time(at.s));
+        const double rounded = std::fabs(at.value) + std::fabs(at.rate) * ulp;
+        // It has crossed with the set, to no effect: rounding does not take it back.
+        if (record.from > 0 && at.s - record.from <= 8 * finest_bracket(at.s, step_.h())) {
+            if (!record.info.boolean) record.band = rounded;
+            continue;
+        }
         const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays there
         const bool may_cross = !record.info.boolean && !rests && at.s > record.from;
         const bool with_set =
@@ -32,11 +40,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         GuardSample last = at;
         // Until it crosses, the guard is on the side that it comes from. The time of the set is
         // rounded to a double.
-        if (with_set) {
-            constexpr double epsilon = std::numeric_limits<double>::epsilon();
-            const double ulp = epsilon * std::fabs(step_.time(at.s));
-            record.band = std::fabs(at.value) + std::fabs(at.rate) * ulp;
-        }
+        if (with_set) record.band = rounded;
         if (with_set) last.value = -std::copysign(std::numeric_limits<double>::min(), at.rate);
         if (!record.acting) {
             search_.note_crossings(step_, bank_, i, last, resolution_, calls());

@@ -434,6 +434,34 @@ TEST(HardEvents, AGuardWithoutAResetIsCarriedBackWhetherOrNotItMayEndTheRun)
     }
 }
 
+/// Falls through zero; guard 0 sets a flag there, and guard 1, with the same surface, is enabled
+/// where the flag is set.
+struct Flagged {
+    static constexpr std::size_t guard_count = 2;
+    double factor = 1;
+    double speed = 1;
+    void flow(double, const X3&, X3& dxdt) const { dxdt = {-speed, 0, 0}; }
+    [[nodiscard]] double guard(std::size_t which, double, const X3& x) const
+    {
+        return which == 0 ? x[0] : factor * x[0];
+    }
+    [[nodiscard]] bool enabled(std::size_t which, double, const X3& x) const
+    {
+        return which == 0 || x[1] > 0;
+    }
+    void reset(std::size_t which, double, X3& x) const { ++x[which + 1]; }
+};
+
+TEST(HardEvents, AGuardThatCrossedWhileItWasDisabledDoesNotFireWhenItIsEnabled)
+{
+    for (int k = 0; k < 100; ++k) {
+        const Flagged system{.factor = k % 2 == 0 ? 1 : 0.25, .speed = 1 + 0.01 * k};
+        const auto run = integrate(system, X3{1, 0, 0}, {.t_end = 3});
+        EXPECT_EQ(run.events.size(), 1u) << k;
+        EXPECT_EQ(run.x[2], 0) << k;
+    }
+}
+
 /// Passes given times, each an event of the same guard.
 struct Train {
     std::vector<double> times;
