@@ -463,8 +463,8 @@ protected:
     bool resting_ = false;
     bool stops_ = false;
     std::size_t stopper_ = no_guard;  ///< the guard of the set that ends the run
-    bool asked_ = false;        ///< the network has been asked about the current step
-    bool cuts_at_all_ = false;  ///< guards without a reset cut the step, too
+    bool asked_ = false;              ///< the network has been asked about the current step
+    bool cuts_at_all_ = false;        ///< guards without a reset cut the step, too
     MergedResets<X> resets_;
     /// Time [s] of the current set. Time and remainder are kept apart in memory: a copy of both as
     /// a pair, right after each has been written by itself, would stall the processor.

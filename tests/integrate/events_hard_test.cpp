@@ -358,9 +358,9 @@ TEST(HardEvents, AGuardThatSwingsBackAndCrossesAgainInTheWindowHasANewEvent)
                                                                  : 63;
         for (const double step : {0.01, 0.05, 0.1, 0.2}) {
             for (const double window : {0.0, 0.1, 1.0}) {
-                const auto run = integrate(Swinging{counted}, X{0, 0},
-                                           {.t_end = 2, .step = step, .event_window = window},
-                                           FixedStep<Rk4>{});
+                const auto run =
+                    integrate(Swinging{counted}, X{0, 0},
+                              {.t_end = 2, .step = step, .event_window = window}, FixedStep<Rk4>{});
                 EXPECT_EQ(run.outcome, Outcome::reached_end) << step << ", " << window;
                 EXPECT_EQ(run.events.size(), events) << step << ", " << window;
                 EXPECT_EQ(run.x[1], static_cast<double>(events)) << step << ", " << window;
