@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "ricochet/nonsmooth/event_hand_over.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
@@ -235,6 +236,58 @@ TEST(EventHandOver, SwitchingWithinTheErrorOfStepsIsHandedOver)
         .amplitude = {-0.89539949334101032, -0.86375976896689943}};
     expect_few_crossings({inclusion}, {-0.11594614767161704, 0.026311280394670216},
                          3.233838431914299, 1e-8);
+}
+
+/// A mass that a spring pulls, on dry friction. Every second an event is recorded, and the one
+/// after 8 s throws it.
+struct Thrown {
+    using State = std::array<double, 2>;
+    struct Friction {
+        static constexpr int state_size = 2;
+        static constexpr int reaction_size = 1;
+        static void smooth(double, const Eigen::Vector2d& w, Eigen::Vector2d& f)
+        {
+            f << w[1], -w[0];
+        }
+        static void observe(Eigen::Matrix<double, 1, 2>& e) { e << 0, 1; }
+        [[nodiscard]] static sets::Box<1> reaction_set(double, const Eigen::Vector2d&)
+        {
+            return sets::Box<1>({-1}, {1});
+        }
+    };
+    static constexpr Crossing crossing = Crossing::either;
+
+    static void flow(double, const State& x, State& dxdt)
+    {
+        dxdt = {x[1], -x[0] - (x[1] >= 0 ? 1 : -1)};
+    }
+    [[nodiscard]] static double guard(double, const State& x) { return x[1]; }
+    [[nodiscard]] static double next_time_event(double t) { return std::floor(t) + 1; }
+    static void time_reset(double t, State& x)
+    {
+        if (t == 8) x[1] = 3;
+    }
+    [[nodiscard]] static Friction set_valued() { return {}; }
+};
+
+TEST(EventHandOver, TimeEventsHappenUnderTheInclusion)
+{
+    const auto run =
+        integrate(Thrown{}, Thrown::State{2.5, 0.1},
+                  {.t_end = 10, .rtol = 1e-10, .atol = 1e-12, .sample_times = {7.5, 8, 9}});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    std::vector<double> times;
+    for (const auto& event : run.events) {
+        if (event.kind == EventKind::time) times.push_back(event.t);
+    }
+    EXPECT_EQ(times, (std::vector<double>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10}));
+    ASSERT_EQ(run.trajectory.x.size(), 3U);
+    EXPECT_NEAR(run.trajectory.x[0][1], 0, 1e-9);
+    EXPECT_EQ(run.trajectory.x[1][1], 3);
+    // From the throw on the mass turns about -1.
+    const double from = run.trajectory.x[1][0] + 1;
+    EXPECT_NEAR(run.trajectory.x[2][0], -1 + from * std::cos(1) + 3 * std::sin(1), 1e-8);
+    EXPECT_NEAR(run.trajectory.x[2][1], 3 * std::cos(1) - from * std::sin(1), 1e-8);
 }
 
 TEST(EventHandOver, AnInclusionAloneNeedsNoOtherCall)

@@ -15,11 +15,16 @@
 // immediately, by which the pressing is recognised. An edge-triggered guard lets that motion pass,
 // and the inclusion is never used.
 //
+// Time events of the system also happen while the inclusion is followed. Events resume after a time
+// reset that changes the state or the mode.
+//
 // Inclusions without events of their own are handed to hand_over.hpp directly.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <limits>
 
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
@@ -190,31 +195,18 @@ private:
     /// Whether the run is over.
     bool follow_inclusion(PhaseCause cause)
     {
-        HandOverOptions options = hand_over_;
-        options.t_start = run_.t;
-        options.sample_times = remaining_samples();
-        options.max_steps -= std::min(options.max_steps, steps_taken());
-        Vector w(static_cast<Eigen::Index>(run_.x.size()));
-        w = detail::converted_state(run_.x, w);
-        HandOver<Set> inclusion(set_, w, options);
-        HandOverRun<Set> done = inclusion.take();
-        run_.phases.push_back({.from = run_.t, .set_valued = true, .cause = cause});
-        for (const auto& event : done.events) run_.events.push_back(converted(event));
-        for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
-            run_.trajectory.t.push_back(done.trajectory.t[i]);
-            run_.trajectory.x.push_back(detail::converted_state(done.trajectory.x[i], run_.x));
-        }
-        detail::add(run_.statistics.event_driven, done.statistics.event_driven);
-        detail::add(run_.statistics.set_valued, done.statistics.set_valued);
+        const double from = run_.t;
+        run_.phases.push_back({.from = from, .set_valued = true, .cause = cause});
         ++run_.statistics.to_set_valued;
-        run_.statistics.set_valued_time += done.state.t - run_.t;
-        const bool moved = done.state.t > run_.t;
-        run_.t = done.state.t;
-        run_.x = detail::converted_state(done.state.w, run_.x);
-        run_.failure = done.failure;
-        run_.outcome = done.outcome;
-        if (done.outcome != Outcome::released) return true;
-        if (!moved) {
+        double due = next_time_event();
+        while (follow_inclusion_until(due)) {
+            bool changes = false;
+            if (!apply_time_event(due, changes)) return true;
+            if (changes) return false;
+            due = next_time_event();
+        }
+        if (run_.outcome != Outcome::released) return true;
+        if (!(run_.t > from)) {
             // The inclusion holds no reaction, and the event-driven run cannot continue from this
             // state.
             run_.outcome = Outcome::not_handed_over;
@@ -222,6 +214,90 @@ private:
         }
         if constexpr (Moded<System, X>) run_.mode = system_.start_mode(run_.t, run_.x);
         return false;
+    }
+
+    /// Follows the inclusion, at most until the time event that is due next; whether it was
+    /// reached.
+    bool follow_inclusion_until(double due)
+    {
+        if (!(due > run_.t)) {
+            run_.outcome = Outcome::time_event_not_ahead;
+            return false;
+        }
+        const bool stops = due <= options_.t_end;
+        HandOverOptions options = hand_over_;
+        options.t_start = run_.t;
+        options.sample_times = remaining_samples();
+        if (stops) {
+            options.t_end = due;
+            // A sample at the time of an event shows the state after it.
+            std::erase_if(options.sample_times, [&](double t) { return t >= due; });
+        }
+        options.max_steps -= std::min(options.max_steps, steps_taken());
+        Vector w(static_cast<Eigen::Index>(run_.x.size()));
+        w = detail::converted_state(run_.x, w);
+        HandOver<Set> inclusion(set_, w, options);
+        HandOverRun<Set> done = inclusion.take();
+        for (const auto& event : done.events) run_.events.push_back(converted(event));
+        for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
+            run_.trajectory.t.push_back(done.trajectory.t[i]);
+            run_.trajectory.x.push_back(detail::converted_state(done.trajectory.x[i], run_.x));
+        }
+        detail::add(run_.statistics.event_driven, done.statistics.event_driven);
+        detail::add(run_.statistics.set_valued, done.statistics.set_valued);
+        run_.statistics.set_valued_time += done.state.t - run_.t;
+        run_.t = done.state.t;
+        run_.x = detail::converted_state(done.state.w, run_.x);
+        run_.failure = done.failure;
+        run_.outcome = done.outcome;
+        return stops && done.outcome == Outcome::reached_end;
+    }
+
+    // --- time events while the inclusion is followed ---
+
+    /// The next time event; infinite if there is none.
+    [[nodiscard]] double next_time_event() const
+    {
+        if constexpr (Timed<System>) {
+            return system_.next_time_event(run_.t);
+        } else {
+            return std::numeric_limits<double>::infinity();
+        }
+    }
+
+    /// Records a time event and applies its reset. Events resume where that changes the state or
+    /// the mode. False if the run ends.
+    bool apply_time_event(double t, bool& changes)
+    {
+        Event<X> event;
+        event.t = t;
+        event.kind = EventKind::time;
+        event.guard = no_guard;
+        event.before = event.after = run_.x;
+        event.bracket = {t, t};
+        Mode mode = run_.mode;
+        if constexpr (Moded<System, X>) mode = system_.start_mode(t, run_.x);
+        event.mode_before = mode;
+        event.mode_after = detail::call_time_reset(system_, mode, t, event.after);
+        changes = event.mode_after != mode || event.after.size() != event.before.size() ||
+                  !detail::same_state(event.after, event.before);
+        if (changes) {
+            run_.x = event.after;
+            run_.mode = event.mode_after;
+        }
+        ++run_.statistics.event_driven.events;
+        if (options_.record_events) run_.events.push_back(event);
+        if (event.after.size() != event.before.size()) {
+            run_.outcome = Outcome::wrong_dimension;
+            return false;
+        }
+        for (const double component : event.after) {
+            if (!std::isfinite(component)) {
+                run_.outcome = Outcome::non_finite;
+                return false;
+            }
+        }
+        return true;
     }
 
     /// Error of a step that ends at state x.
