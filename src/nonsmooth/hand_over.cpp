@@ -97,9 +97,20 @@ void add(Statistics& sum, const Statistics& more) noexcept
 {
     sum.steps += more.steps;
     sum.rejected += more.rejected;
+    sum.refined_steps += more.refined_steps;
+    sum.unresolved_steps += more.unresolved_steps;
     sum.resteps += more.resteps;
     sum.flow_calls += more.flow_calls;
     sum.guard_calls += more.guard_calls;
+    sum.network_calls += more.network_calls;
+    sum.false_alarms += more.false_alarms;
+    sum.missed_events += more.missed_events;
+    sum.late_events += more.late_events;
+    sum.checks_deferred += more.checks_deferred;
+    sum.outside_domain += more.outside_domain;
+    sum.bound_calls += more.bound_calls;
+    sum.rollbacks += more.rollbacks;
+    sum.repeated_steps += more.repeated_steps;
     sum.events += more.events;
     sum.suppressed += more.suppressed;
     sum.disabled += more.disabled;

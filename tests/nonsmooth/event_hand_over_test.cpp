@@ -290,6 +290,28 @@ TEST(EventHandOver, TimeEventsHappenUnderTheInclusion)
     EXPECT_NEAR(run.trajectory.x[2][1], 3 * std::cos(1) - from * std::sin(1), 1e-8);
 }
 
+/// The same with a guard that is narrow, so that steps are divided for it.
+struct Divided : Thrown {
+    static constexpr std::size_t guard_count = 2;
+    [[nodiscard]] static double guard(std::size_t which, double, const State& x)
+    {
+        return which == 0 ? x[1] : 1 - 1.1 * std::exp(-std::pow((x[0] - 1) / 0.02, 2));
+    }
+    [[nodiscard]] static GuardInfo guard_info(std::size_t /*which*/)
+    {
+        GuardInfo info;
+        info.crossing = Crossing::either;
+        return info;
+    }
+};
+
+TEST(EventHandOver, StatisticsCountDividedSteps)
+{
+    const auto run = integrate(Divided{}, Divided::State{2.5, 0.1}, {.t_end = 10, .rtol = 1e-10});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_GT(run.statistics.event_driven.refined_steps, 0U);
+}
+
 TEST(EventHandOver, AnInclusionAloneNeedsNoOtherCall)
 {
     const auto run =
