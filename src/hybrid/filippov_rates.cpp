@@ -168,6 +168,7 @@ using Point = std::array<double, 2>;  ///< both shares
 {
     Continuation result;
     result.margin = 1;
+    result.at = {at[0], at[1]};
     for (std::size_t k = 0; k < 2; ++k) {
         result.to[k] = place_of(at[k]);
         if (result.to[k] != Place::sliding) {

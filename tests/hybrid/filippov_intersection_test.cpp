@@ -728,6 +728,42 @@ detail::RegionRates random_rates(std::mt19937& random)
     return rates;
 }
 
+/// Sliding on both surfaces ends at t = 0.0984, where the second share is 1, near the corner
+/// (0, 1); sliding on the first one at t = 0.1, where the field of region 2 turns away from it.
+struct NearTheCorner {
+    static constexpr std::size_t surface_count = 2;
+    using State = std::array<double, 3>;
+
+    double surface(std::size_t which, double, const auto& x) const { return x[which]; }
+    double surface_rate(std::size_t which, double, const auto&, const auto& dxdt) const
+    {
+        return dxdt[which];
+    }
+    void field(std::size_t region, double t, const auto&, auto& dxdt) const
+    {
+        const std::array<double, 4> first{-0.2, -0.146, 0.01 - 0.1 * t, -0.03};
+        const std::array<double, 4> second{-0.04, -0.73, 0.005, -0.942};
+        dxdt = {first[region], second[region], 1};
+    }
+};
+
+TEST(Filippov, SlidingOnBothEndsAlsoWhereTheOtherShareIsNearItsBound)
+{
+    // Regression: whether the motion leaves was asked of the middle of the edge, where it does not,
+    // and the shares ran out of [0, 1] while both surfaces were held.
+    using Near = Filippov<NearTheCorner>;
+    const auto run = integrate(Near(), {0, 0, 0}, tight(1, Near::mode_of(s, s)));
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.events.size(), 2U);
+    EXPECT_EQ(run.events[0].mode_after, Near::mode_of(s, a));
+    // (1 - a) 0.005 = 0.942 a, with a = r / (r + 0.03) and r = 0.01 - 0.1 t.
+    const double released = 0.1 - 10 * 0.03 * 0.005 / 0.942;
+    EXPECT_NEAR(run.events[0].t, released, 1e-12);
+    EXPECT_EQ(run.events[1].mode_after, Near::mode_of(b, a));
+    EXPECT_NEAR(run.events[1].t, 0.1, 1e-12);
+    EXPECT_NEAR(run.x[0], -0.05 * 0.9 * 0.9, 1e-12);
+}
+
 TEST(FilippovRates, WhereTheSharesStayInsideTheyKeepBothSurfacesStill)
 {
     std::mt19937 random(11);

@@ -94,10 +94,11 @@ public:
         const RegionRates rates = normalised(around(both, slides, t, x).rates);
         const Continuation way = follow_shares(rates, from);
         if (way.to == slides) return slides;
-        // A motion that leaves at a rate of zero may turn back.
+        // A motion that leaves at a rate of zero may turn back. Shares that are far from those with
+        // which it leaves may lead elsewhere.
         const auto later = [&](double time, const X& at) {
             const RegionRates r = around(both, slides, time, at).rates;
-            const Continuation same = follow_shares(normalised(r), middle_of(way.to));
+            const Continuation same = follow_shares(normalised(r), way.at);
             return same.to == way.to ? same.margin : -1;
         };
         return leads_away(way.margin, way.to, t, x, later) ? way.to : slides;

@@ -98,6 +98,7 @@ struct SlidingShares {
 struct Continuation {
     Places to{Place::sliding, Place::sliding};
     double margin = 0;  ///< least of the normalised rates with which it leaves a surface
+    Shares at;          ///< the shares with which it leaves
 };
 
 /// Follows steep but continuous switching: across an intersection the shares change
