@@ -235,6 +235,34 @@ using Point = std::array<double, 2>;  ///< both shares
     return next;
 }
 
+/// A linearly implicit step, restricted to the square, that moves the shares by about 1/64: where
+/// surfaces almost coincide, both shares hurry to a line along which they are slow. An instability
+/// is still followed.
+[[nodiscard]] Point advanced_far(const RegionRates& r, const Point& at, const Point& rate) noexcept
+{
+    const Linearised linear(r, {at[0], at[1]});
+    const double half_trace = 0.5 * (linear.by_first[0] + linear.by_second[1]);
+    const double split = std::max(0.0, half_trace * half_trace - linear.determinant());
+    const double growth = half_trace + std::sqrt(split);
+    double step = 1.0 / 64 / std::max(std::fabs(rate[0]), std::fabs(rate[1]));
+    if (growth > 0) step = std::min(step, 0.25 / growth);
+    const double m00 = 1 - step * linear.by_first[0];
+    const double m01 = -step * linear.by_second[0];
+    const double m10 = -step * linear.by_first[1];
+    const double m11 = 1 - step * linear.by_second[1];
+    const double scale = step / (m00 * m11 - m01 * m10);
+    const Point moved = {scale * (m11 * rate[0] - m01 * rate[1]),
+                         scale * (m00 * rate[1] - m10 * rate[0])};
+    // The first bound that is met ends the step: one share alone would leave the line.
+    double part = 1;
+    for (std::size_t k = 0; k < 2; ++k) {
+        const double room = moved[k] > 0 ? 1 - at[k] : at[k];
+        if (room > 0) part = std::min(part, room / std::fabs(moved[k]) * (1 + 4 * epsilon));
+    }
+    return {std::clamp(at[0] + part * moved[0], 0.0, 1.0),
+            std::clamp(at[1] + part * moved[1], 0.0, 1.0)};
+}
+
 }  // namespace
 
 RegionRates normalised(const RegionRates& rates) noexcept
@@ -281,7 +309,8 @@ SlidingShares sliding_shares(const RegionRates& rates) noexcept
 
 Continuation follow_shares(const RegionRates& normalised, Shares from) noexcept
 {
-    constexpr int most_steps = 10000;
+    constexpr int short_steps = 10000;
+    constexpr int most_steps = short_steps + 10000;
     Point at = {std::clamp(from.first, 0.0, 1.0), std::clamp(from.second, 0.0, 1.0)};
     bool pushed = false;
     for (int i = 0; i < most_steps; ++i) {
@@ -297,7 +326,8 @@ Continuation follow_shares(const RegionRates& normalised, Shares from) noexcept
             for (double& share : at) share = std::min(share + 1e-3, 1.0);
             pushed = true;
         } else {
-            at = advanced(normalised, at, rate);
+            at = i < short_steps ? advanced(normalised, at, rate)
+                                 : advanced_far(normalised, at, rate);
         }
     }
     return {};

@@ -830,6 +830,26 @@ TEST(FilippovRates, FollowingTheSharesAgreesWithSmallSteps)
     EXPECT_GT(compared, 280);
 }
 
+TEST(FilippovRates, SharesOfAlmostCoincidingSurfacesAreFollowedToTheirEnd)
+{
+    // Regression: after 10 000 steps along the line on which both rates are small, the shares
+    // counted as at rest, although the zero of both rates lies outside the square.
+    for (const double angle : {1e-3, 1e-4, 1e-5, 1e-6}) {
+        const std::array<double, 4> of_both{0.45, -0.71, 0.81, -1};
+        detail::RegionRates rates{of_both, of_both};
+        for (const std::size_t region : {0u, 1u, 2u, 3u}) {
+            rates[1][region] += angle * (region < 2 ? 2 : 1);
+        }
+        const auto up = detail::follow_shares(rates, {0.39, 0});
+        EXPECT_EQ(up.to, (detail::Places{s, a})) << angle;
+        EXPECT_NEAR(up.at.first, 0.81 / 1.81, 1e-12);
+        EXPECT_EQ(up.at.second, 1);
+        const detail::RegionRates swapped{{{rates[1][0], rates[1][2], rates[1][1], rates[1][3]},
+                                           {rates[0][0], rates[0][2], rates[0][1], rates[0][3]}}};
+        EXPECT_EQ(detail::follow_shares(swapped, {0, 0.39}).to, (detail::Places{a, s})) << angle;
+    }
+}
+
 TEST(FilippovRates, SharesLeaveThroughCornersAndEdgesAsTheRatesSay)
 {
     // A node holds; two fields beside y = 0 that lead on to x > 0 release it there.
