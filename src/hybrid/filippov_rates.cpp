@@ -334,7 +334,7 @@ Continuation follow_shares(const RegionRates& normalised, Shares from) noexcept
 }
 
 Elimination::Elimination(const std::array<std::array<double, 2>, 2>& normal,
-                         const std::array<double, 2>& residue) noexcept
+                         const std::array<double, 2>& residue, double parallel) noexcept
 {
     // Pairs of the same kind are compared before mixed ones, so that surfaces may be renumbered.
     std::size_t k = 0;
@@ -354,7 +354,7 @@ Elimination::Elimination(const std::array<std::array<double, 2>, 2>& normal,
     residue_rest_ = residue[1 - k] - residue_ * unit;
     pivot_rest_ = normal[1 - k][1 - m] - other_on_pivot_ * unit;
     const double size = std::max(std::fabs(normal[1 - k][0]), std::fabs(normal[1 - k][1]));
-    if (!(std::fabs(pivot_rest_) > 0x1p-40 * size)) pivot_rest_ = 0;
+    if (!(std::fabs(pivot_rest_) > parallel * size)) pivot_rest_ = 0;
 }
 
 const char* filippov_mode_name(std::size_t surfaces, std::uint32_t mode) noexcept

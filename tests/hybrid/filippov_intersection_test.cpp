@@ -764,6 +764,67 @@ TEST(Filippov, SlidingOnBothEndsAlsoWhereTheOtherShareIsNearItsBound)
     EXPECT_NEAR(run.x[0], -0.05 * 0.9 * 0.9, 1e-12);
 }
 
+/// Two oblique planes that are parallel, one of which swings through the other, without the rates
+/// of their surfaces.
+struct ParallelPlanes {
+    static constexpr std::size_t surface_count = 2;
+    using State = std::array<double, 3>;
+
+    std::array<std::array<double, 3>, 4> constant{};
+    std::array<double, 3> normal{};
+    double swing = 0;
+    double frequency = 1;
+
+    explicit ParallelPlanes(std::mt19937& random)
+    {
+        std::uniform_real_distribution<double> number(-1, 1);
+        double square = 0;
+        for (double& n : normal) {
+            n = number(random);
+            square += n * n;
+        }
+        for (double& n : normal) n /= std::sqrt(square);
+        for (std::size_t region = 0; region < 4; ++region) {
+            for (std::size_t i = 0; i < 3; ++i) {
+                constant[region][i] = 0.5 * number(random) - (region % 2 == 0 ? -1 : 1) * normal[i];
+            }
+        }
+        swing = 0.1 + 0.1 * number(random);
+        frequency = 3 + number(random);
+    }
+
+    double surface(std::size_t which, double t, const auto& x) const
+    {
+        const double along = normal[0] * x[0] + normal[1] * x[1] + normal[2] * x[2];
+        return along - 0.1 - (which == 0 ? 0 : swing * std::sin(frequency * t));
+    }
+    void field(std::size_t region, double, const auto& x, auto& dxdt) const
+    {
+        for (std::size_t i = 0; i < 3; ++i) dxdt[i] = constant[region][i] - 0.3 * x[i];
+    }
+};
+
+TEST(Filippov, DifferencesOfParallelSurfacesMoveNoStateFar)
+{
+    // Regression: errors of the differences made the planes oblique to one another, and the motion
+    // was moved far along both, to their intersection.
+    int events = 0;
+    for (unsigned seed = 0; seed < 100; ++seed) {
+        std::mt19937 random(seed);
+        const Filippov<ParallelPlanes> planes{ParallelPlanes(random)};
+        const std::array<double, 3> x0{0.5, 0.3, -0.2};
+        const auto run = integrate(planes, x0, tight(5, planes.start_mode(0, x0)));
+        EXPECT_NE(run.outcome, Outcome::endless_cascade) << seed;
+        for (const auto& event : run.events) {
+            ++events;
+            for (std::size_t i = 0; i < 3; ++i) {
+                EXPECT_NEAR(event.after[i], event.before[i], 1e-9) << seed << " at " << event.t;
+            }
+        }
+    }
+    EXPECT_GT(events, 100);
+}
+
 TEST(FilippovRates, WhereTheSharesStayInsideTheyKeepBothSurfacesStill)
 {
     std::mt19937 random(11);

@@ -29,8 +29,9 @@ public:
     using Motion::Motion;
 
     /// The part of a rate that is rounding, or that remains after location made the rate zero,
-    /// relative to the largest rate: 2e-13.
-    static constexpr double negligible = 0x1p-42;
+    /// relative to the largest rate: 2e-13, or 1e-9 where rates are differences.
+    template <class X>
+    static constexpr double negligible = RatedSurfaces<Fields, X> ? 0x1p-42 : 0x1p-30;
 
     /// Exits that have fired, a bit each, numbered as in `Exits`.
     using FiredExits = unsigned;
@@ -132,14 +133,14 @@ public:
     [[nodiscard]] bool leads_away(double rate, const Places& to, double t, const X& x,
                                   const Later& later) const
     {
-        if (!(std::fabs(rate) <= negligible)) {
+        if (!(std::fabs(rate) <= negligible<X>)) {
             return rate > 0 && !(a_moment_later(to, t, x, later) < 0);
         }
         double ahead = 0;
         Scratch<X, 2> scratch(x);
         const bool clear = follow(to, t, x, scratch[0], scratch[1], [&](double time, const X& at) {
             ahead = later(time, at);
-            return std::fabs(ahead) > 4 * negligible;
+            return std::fabs(ahead) > 4 * negligible<X>;
         });
         return clear && ahead > 0;
     }

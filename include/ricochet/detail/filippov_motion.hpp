@@ -337,7 +337,7 @@ public:
                 if (held & bit(i)) residue[i] = misplaced(i, next[i], round, t, x);
             }
             if (residue[0] == 0 && residue[1] == 0) return;
-            const Elimination eliminate(normal, residue);
+            const Elimination eliminate(normal, residue, parallel<X>);
             for_each_component(x, [&](auto i) {
                 x[i] = eliminate(x[i], by_first(shares, f[0][i], f[1][i], f[2][i], f[3][i]),
                                  by_second(shares, f[0][i], f[1][i], f[2][i], f[3][i]));
@@ -394,13 +394,17 @@ private:
             x, [&](auto i) { dxdt[i] = blend(weights, f[0][i], f[1][i], f[2][i], f[3][i]); });
         const std::array residue{surface_rate(0, t, x, dxdt) + restoring(0, t, x),
                                  surface_rate(1, t, x, dxdt) + restoring(1, t, x)};
-        const Elimination eliminate(normals(shares, rates), residue);
+        const Elimination eliminate(normals(shares, rates), residue, parallel<X>);
         if (!eliminate.possible()) return;
         for_each_component(x, [&](auto i) {
             dxdt[i] = eliminate(dxdt[i], by_first(shares, f[0][i], f[1][i], f[2][i], f[3][i]),
                                 by_second(shares, f[0][i], f[1][i], f[2][i], f[3][i]));
         });
     }
+
+    /// Ratio below which two directions count as parallel: above the errors of the rates.
+    template <class X>
+    static constexpr double parallel = RatedSurfaces<Fields, X> ? 0x1p-40 : 0x1p-28;
 
     /// Derivatives of the bilinear combination with respect to the shares.
     [[nodiscard]] static double by_first(const Shares& shares, double f0, double f1, double f2,

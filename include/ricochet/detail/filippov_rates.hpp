@@ -123,8 +123,9 @@ struct Continuation {
 /// are 1 and differences that are 0 in real arithmetic are so in floating point too.
 class Elimination {
 public:
+    /// Directions are parallel where they differ by less than a part `parallel`.
     Elimination(const std::array<std::array<double, 2>, 2>& normal,
-                const std::array<double, 2>& residue) noexcept;
+                const std::array<double, 2>& residue, double parallel) noexcept;
 
     /// One component, given that component of both directions.
     [[nodiscard]] double operator()(double x, double first, double second) const noexcept

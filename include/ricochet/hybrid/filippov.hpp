@@ -407,7 +407,7 @@ private:
         if (std::fabs(rate) > 1e-6 * detail::largest_component(dxdt)) return rate;
         const auto near = rules_.around(Rules::bit(which) | Rules::sliding_in(at), at, t, x);
         const double size = detail::largest_component(near.rates[which]);
-        return std::fabs(rate) <= Rules::negligible * size ? 0 : rate;
+        return std::fabs(rate) <= Rules::template negligible<X> * size ? 0 : rate;
     }
 
     /// Places of the motion after the fields' own time reset: off the surfaces on which it
