@@ -322,6 +322,27 @@ TEST(EventHandOver, AnInclusionAloneNeedsNoOtherCall)
     EXPECT_NEAR(run.events[0].t, 0.093315472931294579027, 1e-12);
 }
 
+/// The same, to be ended by a number of crossings.
+struct Ended : Thrown {
+    std::uint32_t most;
+    [[nodiscard]] GuardInfo guard_info() const
+    {
+        GuardInfo info;
+        info.crossing = Crossing::either;
+        info.stop_after = most;
+        return info;
+    }
+};
+
+TEST(EventHandOver, StopsAfterOneEventAndRefusesToCountSeveral)
+{
+    const Ended::State x0{2.5, 0.1};
+    const auto run = integrate(Ended{{}, 1}, x0, {.t_end = 10});
+    EXPECT_EQ(run.outcome, Outcome::stopped_by_event);
+    EXPECT_LT(run.t, 1);
+    EXPECT_THROW((void)integrate(Ended{{}, 2}, x0, {.t_end = 10}), std::invalid_argument);
+}
+
 TEST(EventHandOver, RefusesWhatAHandOverDoesNotHave)
 {
     const Belt belt;

@@ -25,6 +25,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <stdexcept>
 
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
@@ -126,6 +127,13 @@ public:
             !Moded<System, X> || requires(Mode & mode) { mode = system.start_mode(0.0, x0); },
             "ricochet: found a system with modes and set_valued(); expected Mode "
             "start_mode(double t, const State& x) const as well, the mode after it");
+        for (std::size_t i = 0; i < guard_count_of<X>(system); ++i) {
+            if (guard_info_of<X>(system, i).stop_after > 1) {
+                throw std::invalid_argument(
+                    "integrate: a run that may be handed over counts the events of a guard in "
+                    "each phase anew, and has no stop_after above 1");
+            }
+        }
         run_.t = options.t_start;
         run_.x = x0;
         run_.mode = options.mode;
@@ -352,8 +360,8 @@ private:
 
 /// Integrates by events as far as possible, and by the inclusion where events cannot continue.
 ///
-/// @throws std::invalid_argument as for other systems; also for `stop_at_event`,
-///         `record_steps` and a backward run, which a hand-over does not support.
+/// @throws std::invalid_argument as for other systems; also for `stop_at_event`, `record_steps`, a
+///         `stop_after` above 1 and a backward run, which a hand-over does not support.
 template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
