@@ -63,16 +63,26 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
     } else if (rise != 0) {
         across = {-infinite, infinite};
     }
+    // A wall against which a body moves against gravity sends it back earlier, and thus farther.
+    const auto is_low = [&](const Face& wall) { return dot(wall.normal, normal) > 0; };
+    const Interval free = across;
+    const double slack = body.radius + 1e-9 * (std::fabs(free.low) + std::fabs(free.high));
     for (std::uint32_t f = 0; f < world.wall_count; ++f) {
         const Face& wall = world.faces[f];
         const double at = dot(wall.at, normal);
-        if (dot(wall.normal, normal) > 0) {
+        if (is_low(wall)) {
+            if (pull > 0 && free.low - slack <= at) across.high = infinite;
+        } else {
+            if (pull < 0 && free.high + slack >= at) across.low = -infinite;
+        }
+    }
+    for (std::uint32_t f = 0; f < world.wall_count; ++f) {
+        const Face& wall = world.faces[f];
+        const double at = dot(wall.at, normal);
+        if (is_low(wall)) {
             across.low = std::max(across.low, at);
         } else {
             across.high = std::min(across.high, at);
-            // A body struck from below may come back faster than it left, if it moves against
-            // gravity.
-            if (pull > 0) across.low = -infinite;
         }
     }
     const Interval sideways =

@@ -188,6 +188,27 @@ TEST(Discs, BallsThatMeetNoneBounceAsEachDoesByItself)
     }
 }
 
+TEST(Discs, WhatACeilingSendsBackMeetsOthers)
+{
+    // With g = 0.2: the lower disc reaches the ceiling at 9 after 1.0 s and comes back, where it
+    // would still be above the other one without a ceiling.
+    for (const double up : {1.0, -1.0}) {
+        for (const bool floor_first : {true, false}) {
+            Scene scene({.gravity = {0, -0.2 * up}});
+            for (const bool low : {floor_first, !floor_first}) {
+                scene.wall(
+                    {.point = {0, low ? -30.0 * up : 10.0 * up}, .normal = {0, low ? up : -up}});
+            }
+            scene.disc({.at = {0, 0}, .velocity = {0, 9.1 * up}});
+            scene.disc({.at = {0.5, -8 * up}});
+            const SceneRun run = simulate(scene, {.t_end = 3});
+            ASSERT_EQ(run.events.size(), 2u) << up << floor_first;
+            EXPECT_NEAR(run.events[0].t, 1.0, 1e-9);
+            EXPECT_FALSE(run.events[1].other.is_surface);
+        }
+    }
+}
+
 TEST(Discs, SleepersAreStruckAndHaveNoEventsBefore)
 {
     // One after the other along a row of equal discs: the velocity is passed on.
