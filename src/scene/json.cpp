@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <unordered_map>
@@ -402,6 +403,26 @@ private:
     std::unordered_map<std::string, MaterialId> materials_;
 };
 
+/// The line of the first number that is too large for a double.
+std::size_t line_of_large_number(std::string_view text)
+{
+    bool inside = false;
+    for (std::size_t at = 0; at < text.size(); ++at) {
+        const char c = text[at];
+        if (inside && c == '\\') {
+            ++at;
+        } else if (c == '"') {
+            inside = !inside;
+        } else if (!inside && c >= '0' && c <= '9') {
+            const std::size_t end = text.find_first_not_of("0123456789+-.eE", at);
+            const std::string number(text.substr(at, end - at));
+            if (std::isinf(std::strtod(number.c_str(), nullptr))) return line_of_byte(text, at);
+            at += number.size() - 1;
+        }
+    }
+    return 1;
+}
+
 /// The line to which a parser's message refers, by a count of bytes or the name of a key.
 std::size_t line_of_trouble(std::string_view text, std::string_view message)
 {
@@ -410,7 +431,7 @@ std::size_t line_of_trouble(std::string_view text, std::string_view message)
     } catch (const json::parse_error& error) {
         return line_of_byte(text, error.byte > 0 ? error.byte - 1 : 0);
     } catch (const json::exception&) {
-        return 1;
+        return line_of_large_number(text);
     }
     const std::size_t from = message.find('"');
     const std::size_t to = message.rfind('"');

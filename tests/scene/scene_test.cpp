@@ -107,6 +107,8 @@ TEST(Scene, ErrorsInAFileNameTheLineTheKeyAndWhatWasExpected)
               "bin.json:2: key \"gravity\" appears twice");
     EXPECT_EQ(trouble("{\"gravity\": [0, 1]\n \"walls\": []}"),
               "bin.json:2: expected JSON, found an error at its byte 27");
+    EXPECT_EQ(trouble("{\"gravity\": [0, 1e9],\n\"memory_limit\":\n-1e400}"),
+              "bin.json:3: expected JSON, found a number out of range");
     EXPECT_EQ(trouble("{\"bodies\": [{\"disc\": {\"radius\": 1},\n \"at\": [0, 0],\n \"grid\": "
                       "[10000, 10000], \"spacing\": [3, 3]}]}"),
               "bin.json:1: Scene: 1e+08 bodies need about 51.2 GB, and memory_limit allows 4 GB");
