@@ -93,6 +93,10 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
             happen(who);
         }
         if (world_.broken) fail_where_broken();
+        if (result_.event_count >= options.max_events) {
+            fail(Outcome::step_limit, {},
+                 fmt::format("max_events = {} events have happened", options.max_events));
+        }
         if (options.cancelled && options.cancelled->load(std::memory_order_relaxed)) {
             fail(Outcome::cancelled, {}, "the run was cancelled");
         }

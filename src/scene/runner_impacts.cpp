@@ -358,10 +358,6 @@ void Runner::resolve_cluster(std::uint32_t i)
     }
     unmoved_ = 0;
     ++result_.event_count;
-    if (result_.event_count >= world_.options.max_events) {
-        fail(Outcome::step_limit, {},
-             fmt::format("max_events = {} events have happened", world_.options.max_events));
-    }
 }
 
 /// Starts a flight of a body in closed form. Returns the face that held it before.

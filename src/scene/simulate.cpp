@@ -192,7 +192,8 @@ SceneRun detail::simulate(const Scene& scene, const SceneOptions& wanted, const 
             if (event.number != last) times.push_back(event.t);
             last = event.number;
         }
-        const auto nth = static_cast<std::ptrdiff_t>(options.max_events - 1);
+        const std::size_t wanted_count = std::min<std::size_t>(options.max_events, times.size());
+        const auto nth = static_cast<std::ptrdiff_t>(wanted_count - 1);
         std::ranges::nth_element(times, times.begin() + nth);
         const double end = times[static_cast<std::size_t>(nth)];
         failure = {Outcome::step_limit,

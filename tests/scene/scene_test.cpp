@@ -182,6 +182,20 @@ TEST(Scene, ABallComesToRestOnTheFloorAndSleepsUntilItIsStruck)
     EXPECT_EQ(struck.bodies[0].velocity[1], 0);
 }
 
+TEST(Scene, EventsOfRestCountTowardsTheLastOne)
+{
+    Scene scene({.gravity = {0, -10}});
+    const auto felt = scene.material({.restitution = 0, .friction = 0.5});
+    scene.wall({.point = {0, 0}, .normal = {0, 1}, .material = felt});
+    scene.disc({.at = {0, 0.1}, .velocity = {1, 0}, .radius = 0.1, .material = felt});
+    const SceneRun all = simulate(scene, {.t_end = 3});
+    ASSERT_EQ(all.statistics.events, 1u);
+    ASSERT_EQ(all.events.back().kind, SceneEvent::Kind::stopped);
+    const SceneRun run = simulate(scene, {.t_end = 3, .max_events = 1});
+    EXPECT_EQ(run.outcome, Outcome::step_limit);
+    EXPECT_EQ(run.t, all.events.back().t);
+}
+
 TEST(Scene, FrictionStopsWhatSlides)
 {
     // Speed 3 under friction 0.25 and g = 10: stops after 1.2 s and 1.8 m.
