@@ -146,6 +146,7 @@ private:
     void leave_edge(std::uint32_t i);
     [[nodiscard]] std::vector<std::uint32_t> touching_faces(std::uint32_t i) const;
     void note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face, const Vector2& velocity);
+    void count_held();
     void sample_until(const Instant& t, bool inclusive, Samples& samples);
     void fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::string message);
     [[nodiscard]] std::string called(std::uint32_t i) const

@@ -139,6 +139,7 @@ void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::stri
         const std::uint32_t group =
             contacts_.join(std::move(members), std::move(faces), patience, now_);
         for (const std::uint32_t i : joined) note_group(SceneEvent::Kind::joined, i);
+        if (!joined.empty()) ++result_.event_count;
         plan_group(group);
     } catch (const std::invalid_argument& error) {
         fail(Outcome::zeno, bodies, error.what());
@@ -301,6 +302,7 @@ void Runner::set_free(const std::vector<std::uint32_t>& bodies)
             islands.push_back(body.island);
         }
     }
+    if (!bodies.empty()) ++result_.event_count;
     Islands& own = *world_.islands;
     for (const std::uint32_t island : islands) {
         std::vector<std::array<Vector2, 2>> states;

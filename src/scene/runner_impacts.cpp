@@ -323,6 +323,7 @@ void Runner::resolve_cluster(std::uint32_t i)
     }
     std::vector<SceneEvent>* events = world_.options.record_events ? &result_.events : nullptr;
     const std::size_t known = result_.events.size();
+    const std::uint64_t struck = world_.statistics.impacts;
     cluster_.lasting = std::ranges::any_of(
         cluster_.bodies, [&](std::uint32_t body) { return world_.bodies[body].contact != none; });
     const bool left = impacts_.resolve(cluster_, now_.value, spend, events);
@@ -336,7 +337,7 @@ void Runner::resolve_cluster(std::uint32_t i)
         spend && contacts_.available() &&
         std::ranges::any_of(cluster_.contacts, [](const Contact& c) { return !c.surface; });
     if ((left || together) && !result_.failure) {
-        ++result_.event_count;
+        result_.event_count += world_.statistics.impacts > struck;
         world_.statistics.collapses += left;
         return hand_over(std::vector(cluster_.bodies), "");
     }

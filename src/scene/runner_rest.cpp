@@ -166,6 +166,7 @@ void Runner::leave_edge(std::uint32_t i)
         const Vector2 n = world_.push_of(body, f);
         if (!world_.leads_off(face, body.p, velocity) &&
             std::fabs(dot(body.v, n)) <= 8 * epsilon * norm(body.v) && dot(world_.gravity, n) < 0) {
+        if (body.held != none) count_held();
             world_.slide(i, f);
             break;
         }
@@ -202,6 +203,12 @@ void Runner::note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face,
         event.before[0] = velocity;
         event.after[0] = world_.bodies[i].v;
         result_.events.push_back(event);
+/// Counts a hold that no impact has led to. What holds at the start is no event.
+void Runner::count_held()
+{
+    if (before(Instant{world_.options.t_start, 0}, now_)) ++result_.event_count;
+}
+
     }
 }
 

@@ -127,6 +127,15 @@ TEST(LastingContact, AStruckSleeperWakesAndSleepsAgain)
     EXPECT_TRUE(all_asleep(run.samples[1]));
     const auto joined = std::ranges::count(run.events, SceneEvent::Kind::joined, &SceneEvent::kind);
     EXPECT_GE(joined, 3);
+    // Entries of one number are of one time, and each number is an event.
+    for (std::size_t k = 1; k < run.events.size(); ++k) {
+        const bool same = run.events[k].number == run.events[k - 1].number;
+        EXPECT_EQ(run.events[k].number, run.events[k - 1].number + (same ? 0 : 1));
+        if (same) {
+            EXPECT_EQ(run.events[k].t, run.events[k - 1].t);
+        }
+    }
+    EXPECT_EQ(run.events.back().number + 1, run.statistics.events);
 }
 
 TEST(LastingContact, ACradleAtRestHandsItsImpulseOn)
