@@ -103,9 +103,18 @@ bool Runner::rests_on_face(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
     if (body.island != none || body.contact != none) return false;
+    const std::uint32_t pressed = pending_[i].other;
+    const std::size_t known = result_.events.size();
     begin_record(i, speed(body, seconds(body.t, now_)), sides_of(i, none));
     settle(i, none);
-    return body.held != none;
+    if (body.held == none) return false;
+    if (!body.asleep && meet_face(world_, i, pressed).presses) {
+        // It slides against an end of terrain, which holds no body by itself.
+        result_.events.resize(known);
+        return false;
+    }
+    count_held();
+    return true;
 }
 
 /// Predicts the times when friction stops a sliding body, or when its face ends.
@@ -157,6 +166,7 @@ void Runner::leave_edge(std::uint32_t i)
     begin_record(i, velocity, sides_of(i, body.held));
     if (is_zero(velocity)) {
         settle(i, none);
+        if (body.held != none) count_held();
         return predict(i);
     }
     for (const std::uint32_t f : touching_faces(i)) {
@@ -166,7 +176,6 @@ void Runner::leave_edge(std::uint32_t i)
         const Vector2 n = world_.push_of(body, f);
         if (!world_.leads_off(face, body.p, velocity) &&
             std::fabs(dot(body.v, n)) <= 8 * epsilon * norm(body.v) && dot(world_.gravity, n) < 0) {
-        if (body.held != none) count_held();
             world_.slide(i, f);
             break;
         }
@@ -194,6 +203,12 @@ void Runner::settle_at_start()
     }
 }
 
+/// Counts a hold that no impact has led to. What holds at the start is no event.
+void Runner::count_held()
+{
+    if (before(Instant{world_.options.t_start, 0}, now_)) ++result_.event_count;
+}
+
 void Runner::note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face,
                   const Vector2& velocity)
 {
@@ -203,12 +218,6 @@ void Runner::note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face,
         event.before[0] = velocity;
         event.after[0] = world_.bodies[i].v;
         result_.events.push_back(event);
-/// Counts a hold that no impact has led to. What holds at the start is no event.
-void Runner::count_held()
-{
-    if (before(Instant{world_.options.t_start, 0}, now_)) ++result_.event_count;
-}
-
     }
 }
 

@@ -198,6 +198,38 @@ TEST(Terrain, DiscsNeedTheContactLibraryOnlyWhereACornerHoldsThem)
     EXPECT_GT(held, 0);
 }
 
+TEST(Terrain, ADiscThatSlidesAgainstAnEndJoinsAGroup)
+{
+    Scene scene({.gravity = {-2.1256968260063425, -3.9994461092242144}});
+    const auto felt = scene.material({.restitution = 0.58153606538496727});
+    scene.terrain({.points = {{-3.0065591970911396, 1.50215979090334},
+                              {-3.2012551555534361, 4.735926542785597},
+                              {-2.2033979558311936, 2.6336864871397752}},
+                   .material = felt});
+    scene.terrain({.points = {{-3.6630743730191067, 2.5579871597377979},
+                              {-1.4929900854609977, 2.0645926054344454},
+                              {-3.2873188486702665, 2.808687515579412}},
+                   .closed = true,
+                   .material = felt});
+    scene.terrain({.points = {{0.86328965654305279, 1.016717672579402},
+                              {-1.4555277618724458, 2.3922690033102065},
+                              {-1.391225595093184, 1.8833172688116726},
+                              {-0.48188624212318221, 3.684398197636344}},
+                   .closed = true,
+                   .material = felt});
+    scene.disc({.at = {-0.80120678982145321, 4.7435874565828069},
+                .velocity = {0.036532840603773487, -2.5775264588650559},
+                .radius = 0.72792611724691125,
+                .mass = 1.1346343371730434,
+                .material = felt});
+    const SceneRun run = simulate(scene, {.t_end = 5, .contacts = scene_contacts()});
+    EXPECT_EQ(run.outcome, Outcome::reached_end) << run.message;
+    EXPECT_LT(run.events.size(), 2000u);
+    EXPECT_TRUE(run.bodies[0].asleep);
+    // Without the solver a sentence says so.
+    EXPECT_EQ(simulate(scene, {.t_end = 5}).outcome, Outcome::zeno);
+}
+
 TEST(Terrain, SmallDiscsInPolygonsStayInside)
 {
     for (std::uint64_t seed = 0; seed < 4000; ++seed) stays_inside(seed, 0.01);
