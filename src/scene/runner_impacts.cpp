@@ -346,14 +346,10 @@ void Runner::resolve_cluster(std::uint32_t i)
         if (const auto bodies = joining(-never, never); !bodies.empty()) {
             return hand_over(bodies, "");
         }
-        ++unmoved_;
-        if (contacts_.available() && unmoved_ > unmoved_to_join) {
+        if (++unmoved_ > (contacts_.available() ? unmoved_to_join : most_unmoved)) {
             unmoved_ = 0;
-            return hand_over(std::vector(cluster_.bodies), "");
-        }
-        if (unmoved_ > most_unmoved) {
-            return fail(Outcome::endless_cascade, {i},
-                        fmt::format("impacts of {} repeat without effect", called(i)));
+            return hand_over(std::vector(cluster_.bodies),
+                             fmt::format("impacts of {} repeat without effect", called(i)));
         }
         return predict(i);
     }
