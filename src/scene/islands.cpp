@@ -385,6 +385,10 @@ bool Islands::restart(std::uint32_t which, const Instant& t,
         const std::size_t k = 4 * place_[body];
         island.x[k + 2] = velocity[0];
         island.x[k + 3] = velocity[1];
+        const Body& point = world_.bodies[body];
+        if (point.radius > 0) continue;
+        island.x[k] = point.p[0];  // on its side of the segments that it has struck
+        island.x[k + 1] = point.p[1];
     }
     island.start = t;
     flow(island, island.x, island.rate, 0);

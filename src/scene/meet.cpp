@@ -46,6 +46,23 @@ namespace {
     return false;
 }
 
+/// A gap from which a flight begins, if it is closed there. The flight then ends at the same gap up
+/// to rounding: otherwise each of many short hops would gain the energy of the difference.
+struct Departure {
+    double gap = 0;
+    double rounding = 0;
+    /// What is left of a later gap.
+    [[nodiscard]] double left_of(double later) const noexcept
+    {
+        const double left = later - gap;
+        return std::fabs(left) <= rounding ? 0 : left;
+    }
+};
+[[nodiscard]] Departure departure(double gap, double rounding) noexcept
+{
+    return gap <= rounding ? Departure{std::max(gap, -rounding), rounding} : Departure{};
+}
+
 [[nodiscard]] Path difference(const Path& a, const Path& b) noexcept
 {
     Path out;
@@ -137,11 +154,12 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
     const Polynomial gap = squared(path, now);
     meeting.after = falls_within(gap, 2 * path.degree, path.until, now.tolerance);
     if (steps && meeting.after > 0 && std::isfinite(meeting.after)) {
+        const Departure begin = departure(norm(path.c[0]) - reach, rounding);
         meeting.after = on_map(meeting.after, path.until, [&](double s) {
             const Instant t = from.after(s);
             const Vector2 apart = world.position(i, t) - world.position(j, t);
             const double distance = norm(apart);
-            return GapAndRate{distance - reach,
+            return GapAndRate{begin.left_of(distance - reach),
                               dot(apart, world.heading(i, t) - world.heading(j, t)) / distance};
         });
     }
@@ -232,15 +250,39 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
         return lands(meeting.after, !above) ? meeting : Meeting{};
     }
     if (gap > reach_of(path)) return meeting;
-    meeting.after = beside ? falls_again(c, 4, path.until) : falls_within(c, 4, path.until, closed);
-    if (meeting.after > 0 && std::isfinite(meeting.after)) {
-        meeting.after = on_map(meeting.after, path.until, [&](double s) {
+    const auto located = [&](double after, double side) {
+        const Departure from = side > 0 && on ? departure(gap, rounding) : Departure{};
+        return on_map(after, path.until, [&](double s) {
             const Instant t = b.t.after(s);
-            return GapAndRate{dot(world.position(i, t) - face.at, normal) - b.radius,
-                              dot(world.velocity(i, t), normal)};
+            const Vector2 facing = side * normal;
+            return GapAndRate{from.left_of(dot(world.position(i, t) - face.at, facing) - b.radius),
+                              dot(world.velocity(i, t), facing)};
         });
+    };
+    const double first =
+        beside ? falls_again(c, 4, path.until) : falls_within(c, 4, path.until, closed);
+    meeting.after = first > 0 && std::isfinite(first) ? located(first, 1) : first;
+    if (!segment || (!beside && first == never)) return meeting;
+    if (first < never && lands(meeting.after, above)) return meeting;
+    // The body passes an end of the segment, and may come back within the step, from either side.
+    Polynomial front = c;
+    if (!beside && gap <= closed) front[0] = 0;
+    Polynomial behind{};
+    for (std::size_t k = 0; k < 5; ++k) behind[k] = -front[k];
+    behind[0] -= 2 * b.radius;
+    const double past = first < never ? (1 + 1e-9) * first : 0;
+    meeting.after = never;
+    for (const double side : {1.0, -1.0}) {
+        for (const double s : falls_in(side > 0 ? front : behind, 4, path.until)) {
+            if (!(s < meeting.after)) break;
+            if (side > 0 && s <= past) continue;
+            const double after = located(s, side);
+            if (!lands(after, side > 0 ? above : !above)) continue;
+            meeting.after = after;
+            break;
+        }
     }
-    return lands(meeting.after, above) ? meeting : Meeting{};
+    return meeting.after < never ? meeting : Meeting{};
 }
 
 Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
@@ -277,11 +319,12 @@ Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
                                      : falls_within(squared(apart, now), 2 * path.degree,
                                                     path.until, now.tolerance);
     if (steps && meeting.after > 0 && std::isfinite(meeting.after)) {
+        const Departure begin = departure(norm(apart.c[0]) - b.radius, rounding);
         meeting.after = on_map(meeting.after, path.until, [&](double s) {
             const Instant t = b.t.after(s);
             const Vector2 from_vertex = world.position(i, t) - face.at;
             const double distance = norm(from_vertex);
-            return GapAndRate{distance - b.radius,
+            return GapAndRate{begin.left_of(distance - b.radius),
                               dot(from_vertex, world.velocity(i, t)) / distance};
         });
     }

@@ -97,6 +97,21 @@ double falls_within(Polynomial c, int degree, double until, double tolerance) no
     return roots.count > 0 ? roots.at[0] : never;
 }
 
+std::array<double, largest_degree> falls_in(const Polynomial& c, int degree, double until) noexcept
+{
+    std::array<double, largest_degree> falls;
+    falls.fill(never);
+    const Roots roots = roots_in(c, degree, until);
+    int count = 0;
+    for (int r = 0; r < roots.count; ++r) {
+        const double s = roots.at[static_cast<std::size_t>(r)];
+        double rate = 0;
+        for (int k = degree; k > 0; --k) rate = rate * s + k * c[static_cast<std::size_t>(k)];
+        if (rate < 0) falls[static_cast<std::size_t>(count++)] = s;
+    }
+    return falls;
+}
+
 double falls_again(const Polynomial& c, int degree, double until) noexcept
 {
     while (degree > 0 && c[static_cast<std::size_t>(degree)] == 0) --degree;

@@ -44,6 +44,11 @@ using Polynomial = std::array<double, largest_degree + 1>;
 [[nodiscard]] double falls_within(Polynomial c, int degree, double until,
                                   double tolerance) noexcept;
 
+/// Times in (0, until] at which a polynomial falls through zero, ascending, followed by `never`. A
+/// root at zero is not one of them.
+[[nodiscard]] std::array<double, largest_degree> falls_in(const Polynomial& c, int degree,
+                                                          double until) noexcept;
+
 /// Time from now until a polynomial that is negative now has risen and falls to zero again.
 [[nodiscard]] double falls_again(const Polynomial& c, int degree, double until) noexcept;
 

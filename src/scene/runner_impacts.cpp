@@ -387,6 +387,7 @@ void Runner::apply()
         Body& body = world_.bodies[i];
         series_[i].last = now_;
         if (body.radius == 0 && body.island != none) {
+            if (body.contact == none) body.p = world_.position(i, now_);
             world_.remember(body, cluster_.sides[k]);
         }
         if (!is_finite(cluster_.after[k])) {
@@ -520,8 +521,10 @@ void Runner::restart_island(std::uint32_t island)
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
         const std::uint32_t i = cluster_.bodies[k];
         const Body& body = world_.bodies[i];
-        if (body.island == island && body.contact == none)
+        if (body.island == island && body.contact == none &&
+            cluster_.after[k] != cluster_.before[k]) {
             velocities_.emplace_back(i, cluster_.after[k]);
+        }
     }
     Islands& islands = *world_.islands;
     const bool taken = islands.restart(island, now_, velocities_);

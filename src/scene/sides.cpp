@@ -54,6 +54,13 @@ bool World::arrives_above(const Body& body, std::uint32_t f, const Vector2& p,
     const double start = height(face, body.p);
     const double rounding = rounding_at(face, body.p);
     if (std::fabs(start) <= rounding) return above;
+    if (body.quartic) {
+        // A step may cross the line more than once.
+        const double up = height(face, p);
+        if (std::fabs(up) > 4 * rounding_at(face, p)) return up > 0;
+        const double falls = -dot(v, face.normal);
+        return std::fabs(falls) > noise(v, {}) ? falls > 0 : above;
+    }
     // The point has passed the end of the segment, turned round, and come back from behind.
     const double rate = dot(v, face.normal) * (above ? 1 : -1);
     const double before = dot(body.v, face.normal) * (above ? 1 : -1);

@@ -128,6 +128,74 @@ TEST(Islands, AnIslandTakesTheSameStepsWhateverElseMoves)
     }
 }
 
+TEST(Islands, StepsThatPassAnEndOfTerrainMeetItAsAFreeFlightDoes)
+{
+    // Drag that hardly acts allows steps which cross the line of a segment beyond its end, turn
+    // round and come back to the segment, on either side.
+    struct Flight {
+        Vector2 gravity;
+        Disc body;
+        std::vector<Vector2> points;
+    };
+    const std::vector<Flight> flights{{{-3.3876206765772494, 3.0841810113600605},
+                                       {.at = {1.615327156257834, 1.1712563319056377},
+                                        .velocity = {2.6884990119899497, 1.4299585092965916},
+                                        .radius = 0},
+                                       {{2.7679533689938003, 3.863979841301556},
+                                        {2.1972782510947675, 1.8134975702137925},
+                                        {2.1129199415344262, 3.0413012038519258}}},
+                                      {{1.5038562048824478, 2.3363130610427945},
+                                       {.at = {-0.39121857, -3.71780347},
+                                        .velocity = {-2.7856265, -1.0022458},
+                                        .radius = 0.31127594353565141},
+                                       {{-3.5900344996504092, 0.092126068675346229},
+                                        {-2.3013968319426366, -1.5015171800186049},
+                                        {-2.48967804276535, 1.8789432580658443}}}};
+    for (const Flight& flight : flights) {
+        const auto run = [&](double drag) {
+            Scene scene({.gravity = flight.gravity});
+            scene.terrain({.points = flight.points});
+            Disc body = flight.body;
+            body.drag = drag;
+            body.radius > 0 ? scene.disc(body)
+                            : scene.point({.at = body.at, .velocity = body.velocity, .drag = drag});
+            return simulate(scene, {.t_end = 2});
+        };
+        const SceneRun free = run(0);
+        const SceneRun stepped = run(1e-14);
+        ASSERT_GE(free.events.size(), 1u);
+        ASSERT_EQ(stepped.events.size(), free.events.size());
+        for (std::size_t k = 0; k < free.events.size(); ++k) {
+            EXPECT_NEAR(stepped.events[k].t, free.events[k].t, 1e-10);
+            EXPECT_NEAR(stepped.events[k].impulse[0], free.events[k].impulse[0], 1e-8);
+        }
+    }
+}
+
+TEST(Islands, HopsGainNoEnergyByRounding)
+{
+    // Each hop is lower than the one before by the restitution, until the time resolves none.
+    std::size_t runs = 0;
+    for (const double restitution : {0.7, 0.8}) {
+        for (int k = 1; k <= 100; ++k) {
+            Scene scene({.gravity = {0, -10}});
+            const auto felt = scene.material({.restitution = restitution, .friction = 0.5});
+            const double floor = -k / 10.0;
+            scene.wall({.point = {0, floor}, .normal = {k % 2 ? 1.0 : 0.0, 4}, .material = felt});
+            scene.disc({.at = {0.3, floor + 1.5},
+                        .velocity = {0.3, 0},
+                        .radius = 0.1,
+                        .drag = 1e-9,
+                        .material = felt});
+            const SceneRun run = simulate(scene, {.t_end = 20, .max_events = 2000});
+            ASSERT_EQ(run.outcome, Outcome::zeno) << restitution << " " << floor;
+            EXPECT_LT(run.events.size(), 400u);
+            ++runs;
+        }
+    }
+    EXPECT_EQ(runs, 200u);
+}
+
 TEST(Islands, DragThatIsTooStiffEndsTheRunInASentence)
 {
     for (const double drag : {1e9, 1e12}) {
