@@ -131,7 +131,7 @@ private:
     void gather_pairs(std::uint32_t slot, std::uint32_t sure);
     void try_pair(std::uint32_t slot, std::uint32_t j, bool sure);
     std::uint32_t slot_of(std::uint32_t body);
-    void apply();
+    void apply(bool struck);
     std::uint32_t begin_record(std::uint32_t i, const Vector2& velocity,
                                const std::vector<Side>& sides);
     void bounce(std::uint32_t i);

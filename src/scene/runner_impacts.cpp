@@ -330,14 +330,13 @@ void Runner::resolve_cluster(std::uint32_t i)
     for (std::size_t k = known; k < result_.events.size(); ++k) {
         result_.events[k].number = result_.event_count;
     }
-    apply();
+    apply(world_.statistics.impacts > struck);
     // Bodies whose restitution was set to 0 stay together: otherwise only the rounding of their
     // velocities separates them, and they would meet again and again.
     const bool together =
         spend && contacts_.available() &&
         std::ranges::any_of(cluster_.contacts, [](const Contact& c) { return !c.surface; });
     if ((left || together) && !result_.failure) {
-        result_.event_count += world_.statistics.impacts > struck;
         world_.statistics.collapses += left;
         return hand_over(std::vector(cluster_.bodies), "");
     }
@@ -354,7 +353,6 @@ void Runner::resolve_cluster(std::uint32_t i)
         return predict(i);
     }
     unmoved_ = 0;
-    ++result_.event_count;
 }
 
 /// Starts a flight of a body in closed form. Returns the face that held it before.
@@ -373,8 +371,9 @@ std::uint32_t Runner::begin_record(std::uint32_t i, const Vector2& velocity,
     return std::exchange(body.held, none);
 }
 
-/// Writes new records of bodies whose velocity has changed, and predicts their meetings.
-void Runner::apply()
+/// Writes new records of bodies whose velocity has changed, and predicts their meetings. Counts the
+/// event if there were impacts, before groups and bounces add events of their own.
+void Runner::apply(bool struck)
 {
     changed_.clear();
     std::vector<std::uint32_t>& islands = slots_of_islands_;
@@ -411,6 +410,7 @@ void Runner::apply()
             cluster_.contacts, [&](const Contact& c) { return c.a == i && c.surface; });
         if (on_surface) settle(i, held);
     }
+    result_.event_count += struck;
     for (const std::uint32_t island : islands) restart_island(island);
     for (const std::uint32_t group : groups_struck_) restart_group(group);
     if (result_.failure) return;
@@ -447,7 +447,8 @@ void Runner::bounce(std::uint32_t i)
     const double twice = -2 / pull;
     const double shortest = resolution({stop, 0});
     const double side_pull = dot(world_.gravity, along);
-    const std::uint64_t most = world_.options.max_events - result_.event_count;
+    const std::uint64_t most =
+        world_.options.max_events - std::min(world_.options.max_events, result_.event_count);
     const bool recorded = world_.options.record_events;
     double whole = body.t.value;
     double rest = body.t.remainder;

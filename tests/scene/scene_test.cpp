@@ -182,6 +182,23 @@ TEST(Scene, ABallComesToRestOnTheFloorAndSleepsUntilItIsStruck)
     EXPECT_EQ(struck.bodies[0].velocity[1], 0);
 }
 
+TEST(Scene, EachBounceOfABallAloneHasItsNumber)
+{
+    Scene scene({.gravity = {0, -10}});
+    const auto rubber = scene.material({.restitution = 0.5});
+    scene.wall({.point = {0, 0}, .normal = {0, 1}, .material = rubber});
+    scene.disc({.at = {0, 2}, .radius = 0.1, .material = rubber});
+    for (const std::uint64_t most : {SceneOptions{}.max_events, std::uint64_t{5}}) {
+        const SceneRun run = simulate(scene, {.t_end = 10, .max_events = most});
+        for (std::size_t k = 0; k < run.statistics.events; ++k) {
+            EXPECT_EQ(run.events[k].number, k);
+            EXPECT_EQ(run.events[k].kind, SceneEvent::Kind::impact);
+        }
+        EXPECT_EQ(run.events.back().number + 1, run.statistics.events);
+        EXPECT_EQ(run.outcome, most == 5 ? Outcome::step_limit : Outcome::reached_end);
+    }
+}
+
 TEST(Scene, EventsOfRestCountTowardsTheLastOne)
 {
     Scene scene({.gravity = {0, -10}});
