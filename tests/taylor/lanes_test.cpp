@@ -166,9 +166,28 @@ struct Ball {
     }
 };
 
+/// A spring of the ninth power beside a wall, from which series start whose last two terms vanish.
+struct FlatBowl {
+    using State = Two;
+    static constexpr bool unilateral = true;
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        using std::pow;
+        dxdt[0] = x[1];
+        dxdt[1] = -pow(x[0], 9);
+    }
+    template <class S>
+    [[nodiscard]] constexpr S guard(const S& /*t*/, const std::array<S, 2>& x) const
+    {
+        return x[0];
+    }
+    void reset(double /*t*/, State& x) const { x = {0, -0.95 * x[1]}; }
+};
+
 static_assert(runs_in_lanes<HenonHeiles> && runs_in_lanes<Pendulum> && runs_in_lanes<Impact>);
 static_assert(runs_in_lanes<Powers> && runs_in_lanes<Angles> && runs_in_lanes<Arcs>);
-static_assert(runs_in_lanes<Kicked>);
+static_assert(runs_in_lanes<Kicked> && runs_in_lanes<FlatBowl>);
 static_assert(!runs_in_lanes<Ball>);  // a polynomial, whose steps end at events
 
 [[nodiscard]] bool same_bits(double a, double b)
@@ -297,6 +316,15 @@ TEST(Lanes, BouncingBallsHaveTheBitsOfRunsAlone)
 {
     const auto starts = starts_around(Two{10, 0}, 1, 5);
     EXPECT_GT(expect_bits_of_runs_alone(Ball{}, starts, {.t_end = 18, .rtol = 1e-12}), 40U);
+}
+
+TEST(Lanes, SeriesWhoseLastTermsVanishHaveTheBitsOfRunsAlone)
+{
+    const auto starts = starts_around(Two{1, 0}, 0.2, 9);
+    for (const double tolerance : {1e-6, 1e-9, 1e-13}) {
+        const Options options{.t_end = 60, .rtol = tolerance, .atol = tolerance};
+        EXPECT_GT(expect_bits_of_runs_alone(FlatBowl{}, starts, options), 40U);
+    }
 }
 
 TEST(Lanes, FunctionsInTheFlowHaveTheBitsOfRunsAlone)

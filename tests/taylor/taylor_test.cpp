@@ -527,5 +527,74 @@ TEST(Taylor, GuardsThatTheObjectCountsAreSampled)
     }
 }
 
+/// x'' = -x^degree beside a wall at 0, from which every flight starts with a series in
+/// t^(degree + 1): its last two terms may vanish, whatever the length of the step.
+template <int degree>
+struct FlatBowl {
+    using State = Two;
+    static constexpr bool unilateral = true;
+
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        using std::pow;
+        dxdt[0] = x[1];
+        dxdt[1] = -pow(x[0], degree);
+    }
+    template <class S>
+    [[nodiscard]] constexpr S guard(const S& /*t*/, const std::array<S, 2>& x) const
+    {
+        return x[0];
+    }
+    void reset(double /*t*/, State& x) const { x = {0, -x[1]}; }
+};
+
+template <int degree>
+void expect_flights_of_one_energy()
+{
+    for (const double tolerance : {1e-6, 1e-9, 1e-13}) {
+        const auto run = integrate(FlatBowl<degree>{}, Two{1, 0},
+                                   {.t_end = 40, .rtol = tolerance, .atol = tolerance},
+                                   ErrorControlled<Taylor>{});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << degree << ", " << tolerance;
+        ASSERT_GE(run.events.size(), 8U);
+        const double flight = 2 * run.events[0].t;
+        for (std::size_t k = 0; k < run.events.size(); ++k) {
+            const auto& event = run.events[k];
+            EXPECT_NEAR(event.t, (static_cast<double>(k) + 0.5) * flight, 1e3 * tolerance);
+            EXPECT_NEAR(event.after[1] * event.after[1] / 2, 1.0 / (degree + 1), 1e3 * tolerance);
+        }
+    }
+}
+TEST(Taylor, StepsAreRightWhereTheLastTermsVanishBySymmetry)
+{
+    expect_flights_of_one_energy<3>();
+    expect_flights_of_one_energy<5>();
+    expect_flights_of_one_energy<7>();
+    expect_flights_of_one_energy<9>();
+}
+
+/// x' = cos(t^2), of which a step is requested that is too long.
+struct Fresnel {
+    using State = std::array<double, 1>;
+    template <class S>
+    constexpr void flow(const S& t, const std::array<S, 1>& /*x*/, std::array<S, 1>& dxdt) const
+    {
+        using std::cos;
+        dxdt[0] = cos(t * t);
+    }
+};
+
+TEST(Taylor, FirstStepsAreShortenedWhereTheLastTermsVanishBySymmetry)
+{
+    const double exact = 0.702863557730269;  // the integral from 0 to 3
+    for (const double tolerance : {1e-6, 1e-9, 1e-12}) {
+        const auto run = integrate(Fresnel{}, Fresnel::State{0},
+                                   {.t_end = 3, .step = 3, .rtol = tolerance, .atol = tolerance},
+                                   ErrorControlled<Taylor>{});
+        EXPECT_NEAR(run.x[0], exact, 10 * tolerance);
+    }
+}
+
 }  // namespace
 }  // namespace ricochet::taylor_test

@@ -31,12 +31,14 @@
 
 namespace ricochet::detail {
 
-/// As `find_reach`.
+/// As `find_reach`, where the earlier terms decay.
 /// @param each  absolute tolerances of the components in place of `atol`, or null
+/// @param decays  whether they do
 template <class Pack, std::size_t n>
 [[nodiscard, gnu::always_inline]] inline Pack find_reach(const std::array<Pack, n>& x0,
                                                          const double* each, const Pack* c,
-                                                         int order, double rtol, double atol)
+                                                         int order, double rtol, double atol,
+                                                         typename Pack::Mask& decays)
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     constexpr double least = std::numeric_limits<double>::min();
@@ -77,6 +79,7 @@ template <class Pack, std::size_t n>
         h = select(going, longest(), h);
         going = going & (h < infinity);
     }
+    decays = earlier_terms_decay(c, order, h, each, rtol, atol, size);
     return h;
 }
 
@@ -321,7 +324,8 @@ private:
         const double* const each =
             options_.component_atol.empty() ? nullptr : options_.component_atol.data();
         const Pack* const c = coefficients_.data();
-        const Pack reach = find_reach(x0_, each, c, order_, options_.rtol, options_.atol);
+        Mask decays{};
+        const Pack reach = find_reach(x0_, each, c, order_, options_.rtol, options_.atol, decays);
         const Pack ulp = std::numeric_limits<double>::epsilon() * size_of(start_);
         const Pack smallest =
             larger_of(options_.h_min, larger_of(4.0 * ulp, std::numeric_limits<double>::min()));
@@ -329,6 +333,7 @@ private:
         const Pack until = in_time((end_ - start_) - start_remainder_);
         Mask fine =
             (active_ & (steps_ < most_steps_)) & ((reach >= smallest) & ~(h * (1 + 1e-6) >= until));
+        fine = fine & decays;
         if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
             fine = fine & ~fine;
         }
