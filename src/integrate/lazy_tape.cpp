@@ -216,7 +216,8 @@ void LazyTape::find_slopes()
         case TaylorOp::quotient: return (a[k] - convolve(k, 1, upto_b, b, own)) * inverses_[i];
         case TaylorOp::constant_over: return convolve(k, 1, upto_a, a, own) * inverses_[i];
         case TaylorOp::square_root: return (a[k] - square(k, 1, own)) * inverses_[i];
-        case TaylorOp::power: {
+        case TaylorOp::power:
+        case TaylorOp::cube_root: {
             double sum = 0;
             const double each = (op.exponent + 1) / k;
             for (int j = 1; j <= upto_a; ++j) sum += (each * j - 1) * a[j] * own[k - j];
@@ -312,9 +313,8 @@ double LazyTape::begin(std::size_t i)
         case TaylorOp::over_constant: return c * a;
         case TaylorOp::constant_over: inverse = -1 / a; return c / a;
         case TaylorOp::square_root: inverse = 0.5 / std::sqrt(a); return std::sqrt(a);
-        case TaylorOp::power:
-            inverse = 1 / a;
-            return op.exponent == 1.0 / 3 ? std::cbrt(a) : std::pow(a, op.exponent);
+        case TaylorOp::power: inverse = 1 / a; return std::pow(a, op.exponent);
+        case TaylorOp::cube_root: inverse = 1 / a; return std::cbrt(a);
         case TaylorOp::exponential: return std::exp(a);
         case TaylorOp::logarithm: inverse = 1 / a; return std::log(a);
         case TaylorOp::sine: return std::sin(a);

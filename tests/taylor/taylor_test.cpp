@@ -596,5 +596,49 @@ TEST(Taylor, FirstStepsAreShortenedWhereTheLastTermsVanishBySymmetry)
     }
 }
 
+/// x' = -1 - root / 10, with the root as a power or as a cube root.
+template <bool is_power>
+struct ThirdPower {
+    using State = std::array<double, 1>;
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, 1>& x, std::array<S, 1>& dxdt) const
+    {
+        using std::cbrt, std::pow;
+        if constexpr (is_power) dxdt[0] = -1.0 - 0.1 * pow(x[0], 1.0 / 3);
+        if constexpr (!is_power) dxdt[0] = -1.0 - 0.1 * cbrt(x[0]);
+    }
+};
+
+TEST(Taylor, ThirdPowersOfNegativeNumbersAreNoCubeRoots)
+{
+    const Options options{.t_end = 3, .rtol = 1e-12, .atol = 1e-12};
+    const auto power = integrate(ThirdPower<true>{}, {-0.5}, options, ErrorControlled<Taylor>{});
+    EXPECT_EQ(power.outcome, Outcome::non_finite);
+    EXPECT_EQ(integrate(ThirdPower<true>{}, {-0.5}, options).outcome, Outcome::non_finite);
+    const auto root = integrate(ThirdPower<false>{}, {-0.5}, options, ErrorControlled<Taylor>{});
+    const auto expected = integrate(ThirdPower<false>{}, {-0.5}, options);
+    EXPECT_EQ(root.outcome, Outcome::reached_end);
+    EXPECT_NEAR(root.x[0], expected.x[0], 1e-9);
+}
+
+/// x' = 1 - x^20, from x = 0.
+struct HighPower {
+    using State = std::array<double, 1>;
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, 1>& x, std::array<S, 1>& dxdt) const
+    {
+        using std::pow;
+        dxdt[0] = 1.0 - pow(x[0], 20);
+    }
+};
+
+TEST(Taylor, WholePowersOfZeroHaveASeries)
+{
+    const Options options{.t_end = 1.5, .rtol = 1e-12, .atol = 1e-12};
+    const auto run = integrate(HighPower{}, {0.0}, options, ErrorControlled<Taylor>{});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_NEAR(run.x[0], integrate(HighPower{}, {0.0}, options).x[0], 1e-10);
+}
+
 }  // namespace
 }  // namespace ricochet::taylor_test

@@ -45,6 +45,7 @@ enum class TaylorOp : std::uint8_t {
     constant_over,       ///< c / a
     square_root,         ///< sqrt(a)
     power,               ///< a^exponent
+    cube_root,           ///< a^exponent for every sign of a, with exponent = 1/3
     exponential,         ///< exp(a)
     logarithm,           ///< log(a)
     sine,                ///< sin(a), with b = cos(a)
@@ -234,7 +235,7 @@ public:
 
     friend constexpr Recorded cbrt(const Recorded& a)
     {
-        if (!a.is_constant()) return of_power(a, 1.0 / 3);
+        if (!a.is_constant()) return of_power(TaylorOp::cube_root, a, 1.0 / 3);
         return folded(std::is_constant_evaluated() ? 1 : std::cbrt(a.value_));
     }
     friend constexpr Recorded asin(const Recorded& a)
@@ -279,8 +280,21 @@ public:
     {
         return sqrt(a * a + b * b);
     }
+    template <class T>
+    requires std::is_arithmetic_v<T>
+    friend constexpr Recorded hypot(const Recorded& a, const T& b)
+    {
+        return hypot(a, number(b));
+    }
+    template <class T>
+    requires std::is_arithmetic_v<T>
+    friend constexpr Recorded hypot(const T& a, const Recorded& b)
+    {
+        return hypot(number(a), b);
+    }
 
-    /// a^b. The exponent is part of the structure: whole powers are products.
+    /// a^b. The exponent is part of the structure: whole powers are products, whose series exists
+    /// at a = 0 too.
     friend constexpr Recorded pow(const Recorded& a, double b)
     {
         if (a.is_constant()) {
@@ -288,11 +302,11 @@ public:
         }
         if (b == 0.5) return sqrt(a);
         const double size = b < 0 ? -b : b;
-        if (size <= 16 && size == static_cast<double>(static_cast<int>(size))) {
+        if (size <= most_whole_power && size == static_cast<double>(static_cast<int>(size))) {
             const Recorded whole = whole_power(a, static_cast<int>(size));
             return b < 0 ? 1.0 / whole : whole;
         }
-        return of_power(a, b);
+        return of_power(TaylorOp::power, a, b);
     }
     template <class T>
     requires std::is_integral_v<T>
@@ -312,6 +326,8 @@ public:
     }
 
 private:
+    static constexpr double most_whole_power = 1024;
+
     [[nodiscard]] static constexpr Recorded folded(double value) noexcept
     {
         Recorded out;
@@ -336,10 +352,11 @@ private:
     {
         return {*a.recording_, a.recording_->push_back({.op = op, .a = a.index_, .b = b.index_})};
     }
-    [[nodiscard]] static constexpr Recorded of_power(const Recorded& a, double exponent)
+    [[nodiscard]] static constexpr Recorded of_power(TaylorOp op, const Recorded& a,
+                                                     double exponent)
     {
-        return {*a.recording_, a.recording_->push_back(
-                                   {.op = TaylorOp::power, .a = a.index_, .exponent = exponent})};
+        return {*a.recording_,
+                a.recording_->push_back({.op = op, .a = a.index_, .exponent = exponent})};
     }
     /// `other` as a series in the recording of this one.
     [[nodiscard]] constexpr Recorded beside(const Recorded& other) const

@@ -269,10 +269,10 @@ private:
             out = of_a([](double v) { return std::sqrt(v); });
             inverse_[i] = 0.5 / out;
         } else if constexpr (op.op == TaylorOp::power) {
-            out = of_a([](double v) {
-                constexpr double exponent = op_at(i).exponent;
-                return exponent == 1.0 / 3 ? std::cbrt(v) : std::pow(v, exponent);
-            });
+            out = of_a([](double v) { return std::pow(v, op_at(i).exponent); });
+            inverse_[i] = 1 / a;
+        } else if constexpr (op.op == TaylorOp::cube_root) {
+            out = of_a([](double v) { return std::cbrt(v); });
             inverse_[i] = 1 / a;
         } else if constexpr (op.op == TaylorOp::exponential) {
             out = of_a([](double v) { return std::exp(v); });
@@ -384,7 +384,7 @@ private:
             const S sum = square<k, 1>(own);
             if constexpr (k > da) return -sum * inverse_[i];
             if constexpr (k <= da) return (a[k] - sum) * inverse_[i];
-        } else if constexpr (op.op == TaylorOp::power) {
+        } else if constexpr (op.op == TaylorOp::power || op.op == TaylorOp::cube_root) {
             return Sum::template power<upto_a>(op.exponent, a, own) * inverse_[i];
         } else if constexpr (op.op == TaylorOp::exponential) {
             return Sum::template convolve<1, upto_a>(slope<op.a>(), own) * (1.0 / k);
@@ -534,7 +534,8 @@ private:
             case TaylorOp::quotient: return (a[k] - convolve(k, 1, upto_b, b, own)) * inverse_[i];
             case TaylorOp::constant_over: return convolve(k, 1, upto_a, a, own) * inverse_[i];
             case TaylorOp::square_root: return (a[k] - square(k, 1, own)) * inverse_[i];
-            case TaylorOp::power: {
+            case TaylorOp::power:
+            case TaylorOp::cube_root: {
                 double sum = 0;
                 const double each = (op.exponent + 1) / k;
                 for (int j = 1; j <= upto_a; ++j) sum += (each * j - 1) * a[j] * own[k - j];
