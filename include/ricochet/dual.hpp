@@ -261,16 +261,36 @@ struct Dual {
     {
         using std::atan2;
         const T r2 = x.value * x.value + y.value * y.value;
-        return y.with(x, atan2(y.value, x.value),
-                      [&](const T& dy, const T& dx) { return (x.value * dy - y.value * dx) / r2; });
+        return y.with(x, atan2(y.value, x.value), [&](const T& dy, const T& dx) {
+            return vanishes(dy) && vanishes(dx) ? T(0.0) : (x.value * dy - y.value * dx) / r2;
+        });
     }
     friend constexpr Dual hypot(const Dual& a, const Dual& b)
     {
         using std::hypot;
         const T f = hypot(a.value, b.value);
-        return a.with(b, f,
-                      [&](const T& d, const T& e) { return (a.value * d + b.value * e) / f; });
+        return a.with(b, f, [&](const T& d, const T& e) {
+            return vanishes(d) && vanishes(e) ? T(0.0) : (a.value * d + b.value * e) / f;
+        });
     }
+#define RICOCHET_DUAL_WITH_NUMBERS(name)                  \
+    template <class U>                                    \
+    requires std::is_arithmetic_v<U>                      \
+    friend constexpr Dual name(const Dual& a, const U& b) \
+    {                                                     \
+        return name(a, Dual(b));                          \
+    }                                                     \
+    template <class U>                                    \
+    requires std::is_arithmetic_v<U>                      \
+    friend constexpr Dual name(const U& a, const Dual& b) \
+    {                                                     \
+        return name(Dual(a), b);                          \
+    }
+    RICOCHET_DUAL_WITH_NUMBERS(atan2)
+    RICOCHET_DUAL_WITH_NUMBERS(hypot)
+    RICOCHET_DUAL_WITH_NUMBERS(fmax)
+    RICOCHET_DUAL_WITH_NUMBERS(fmin)
+#undef RICOCHET_DUAL_WITH_NUMBERS
     template <class U>
     requires std::is_arithmetic_v<U>
     friend constexpr Dual pow(const Dual& a, const U& exponent)
@@ -284,6 +304,13 @@ struct Dual {
         using std::pow, std::log;
         const T f = pow(a.value, b.value);
         return a.with(b, f, [&](const T& d, const T& e) {
+            const bool by_base = !vanishes(d) && !vanishes(b.value);
+            // 0^b = 0 for all b > 0
+            const bool by_exponent = !vanishes(e) && !(vanishes(a.value) && is_positive(b.value));
+            if (!by_exponent) {
+                return by_base ? b.value * pow(a.value, b.value - 1.0) * d : T(0.0);
+            }
+            if (!by_base) return f * log(a.value) * e;
             return b.value * pow(a.value, b.value - 1.0) * d + f * log(a.value) * e;
         });
     }
@@ -293,6 +320,7 @@ struct Dual {
     {
         using std::pow, std::log;
         const T f = pow(T(number(a)), b.value);
+        if (number(a) == 0 && is_positive(b.value)) return b.chain(f, T(0.0));
         return b.chain(f, f * std::log(number(a)));
     }
     friend constexpr Dual max(const Dual& a, const Dual& b)
@@ -310,6 +338,15 @@ struct Dual {
     friend constexpr Dual fmin(const Dual& a, const Dual& b)
     {
         return min(a, b);
+    }
+
+    /// Whether the value and all derivatives are 0.
+    [[nodiscard]] constexpr bool all_vanish() const noexcept
+    {
+        for (const T& d : slope) {
+            if (!vanishes(d)) return false;
+        }
+        return vanishes(value);
     }
 
 private:
@@ -339,10 +376,28 @@ private:
     /// infinite.
     [[nodiscard]] constexpr Dual chain(const T& f, const T& rate) const
     {
-        return to(f, [&](const T& d) {
-            if constexpr (std::is_same_v<T, double>) return d == 0 ? 0 : rate * d;
-            if constexpr (!std::is_same_v<T, double>) return rate * d;
-        });
+        return to(f, [&](const T& d) { return vanishes(d) ? T(0.0) : rate * d; });
+    }
+    /// Whether a number is 0 with all its derivatives; false where that is not known.
+    [[nodiscard]] static constexpr bool vanishes(const T& number) noexcept
+    {
+        if constexpr (std::is_arithmetic_v<T>) {
+            return number == 0;
+        } else if constexpr (requires { number.all_vanish(); }) {
+            return number.all_vanish();
+        } else {
+            return false;
+        }
+    }
+    [[nodiscard]] static constexpr bool is_positive(const T& number) noexcept
+    {
+        if constexpr (std::is_arithmetic_v<T>) {
+            return number > 0;
+        } else if constexpr (requires { number.all_vanish(); }) {
+            return number > 0;
+        } else {
+            return false;
+        }
     }
 };
 

@@ -50,6 +50,34 @@ std::vector<S> functions_of(const S& x, const S& y)
             pow(2.0, x), max(x, y), min(x, y)};
 }
 
+TEST(Dual, PowersWhoseExponentIsADualHaveTheirDerivativesAtZeroAndBelow)
+{
+    using D = Dual<2>;
+    const auto by = [](const D& d) { return d.slope; };
+    // The exponent is a number that happens to be a dual, as a parameter of another direction.
+    EXPECT_EQ(by(pow(D(0.0, {1, 0}), D(1.5))), (X{0, 0}));
+    EXPECT_EQ(by(pow(D(-2.0, {1, 0}), D(2.0))), (X{-4, 0}));
+    EXPECT_EQ(by(pow(D(-2.0, {1, 0}), D(0.0)))[1], 0);
+    // 0^b = 0 for every b > 0
+    EXPECT_EQ(by(pow(D(0.0, {1, 0}), D(2.0, {0, 1}))), (X{0, 0}));
+    EXPECT_EQ(by(pow(D(0.0), D(0.5, {0, 1}))), (X{0, 0}));
+    EXPECT_EQ(by(pow(0.0, D(2.0, {0, 1}))), (X{0, 0}));
+    EXPECT_TRUE(std::isnan(by(pow(D(-2.0, {1, 0}), D(2.0, {0, 1})))[1]));
+}
+
+TEST(Dual, WhatDoesNotDependOnADirectionHasNoDerivativeByItEvenAtABranchPoint)
+{
+    using D = Dual<1>;
+    EXPECT_EQ(hypot(D(0.0), D(0.0)).slope[0], 0);
+    EXPECT_EQ(atan2(D(0.0), D(0.0)).slope[0], 0);
+    EXPECT_EQ(hypot(D(3.0, {1}), 4).slope[0], 0.6);
+    EXPECT_EQ(atan2(1.0, D(1.0, {1})).slope[0], -0.5);
+    using Nested = Dual<1, D>;
+    const Nested zero(D(0.0), {D(0.0)});
+    EXPECT_EQ(sqrt(zero).slope[0].slope[0], 0);
+    EXPECT_EQ(pow(zero, 0.5).slope[0].slope[0], 0);
+}
+
 // The central difference over h = 1e-6 in long double has an error of h^2 / 6 times the third
 // derivative, at most 500 here, and of rounding, 1e-19 / 1e-6: together 1e-10.
 TEST(Dual, DerivativesAreThoseOfDifferences)
