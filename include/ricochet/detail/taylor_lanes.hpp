@@ -49,6 +49,7 @@ template <class Pack, std::size_t n>
     {
         return select(a < least, least, select(most < a, most, a));
     };
+    Pack apart(infinity);
     const auto longest = [&]() __attribute__((always_inline))
     {
         Pack last(0.0), before(0.0);
@@ -59,9 +60,10 @@ template <class Pack, std::size_t n>
             before = larger_of(before, size_of(*(cp + i - n)) * scale);
         }
         const auto is_series = (last > least) | (before > least);
-        const Pack h = rough_exp2(smaller_of(rough_log2(clamped(last)) * by_last,
-                                             rough_log2(clamped(before)) * by_before));
-        return select(is_series, h, infinity);
+        const Pack of_last = rough_log2(clamped(last)) * by_last;
+        const Pack of_before = rough_log2(clamped(before)) * by_before;
+        apart = select(is_series, size_of(of_last - of_before), infinity);
+        return select(is_series, rough_exp2(smaller_of(of_last, of_before)), infinity);
     };
     for (std::size_t i = 0; i < n; ++i) size[i] = size_of(x0[i]);
     Pack h = longest();
@@ -76,10 +78,15 @@ template <class Pack, std::size_t n>
         }
         going = going & larger;
         if (!going.any()) break;
+        const Pack apart_before = apart;
         h = select(going, longest(), h);
+        apart = select(going, apart, apart_before);
         going = going & (h < infinity);
     }
-    decays = earlier_terms_decay(c, order, h, each, rtol, atol, size);
+    decays = apart <= most_apart;
+    if ((~decays).any()) {
+        decays = decays | earlier_terms_decay(c, order, h, each, rtol, atol, size);
+    }
     return h;
 }
 

@@ -78,6 +78,9 @@ inline constexpr std::array<std::array<double, earlier_orders>, 3> earlier_weigh
     return earlier_weights[order <= 12 ? 0 : order <= 16 ? 1 : 2];
 }
 inline constexpr double most_excess = 16;
+/// Two terms that do not vanish give lengths of which one is at most 3/2 of the other; then the
+/// earlier terms need no comparison.
+inline constexpr double most_apart = 0.585;
 
 /// Whether a series that has decayed to the tolerance at h, at its last two terms, has decayed
 /// at the earlier ones as well. The last two say nothing where they vanish by symmetry, as in
@@ -174,6 +177,7 @@ template <class X, class Array>
     constexpr double infinity = std::numeric_limits<double>::infinity();
     const std::size_t n = size.size();
     const double by_last = -1.0 / order, by_before = -1.0 / (order - 1);
+    double apart = infinity;  // of the lengths by either term
     const auto longest = [&] {
         double last = 0, before = 0;
         const double* const cp = c + static_cast<std::size_t>(order) * n;
@@ -184,10 +188,13 @@ template <class X, class Array>
         }
         // The last two terms vanish: the motion is a polynomial, as far as can be detected.
         const double least = std::numeric_limits<double>::min();
+        apart = infinity;
         if (!(last > least) && !(before > least)) return infinity;
         const double most = std::numeric_limits<double>::max();
-        return rough_exp2(std::min(rough_log2(std::clamp(last, least, most)) * by_last,
-                                   rough_log2(std::clamp(before, least, most)) * by_before));
+        const double of_last = rough_log2(std::clamp(last, least, most)) * by_last;
+        const double of_before = rough_log2(std::clamp(before, least, most)) * by_before;
+        apart = std::fabs(of_last - of_before);
+        return rough_exp2(std::min(of_last, of_before));
     };
     for (std::size_t i = 0; i < n; ++i) size[i] = std::fabs(x0[i]);
     double h = longest();
@@ -204,6 +211,7 @@ template <class X, class Array>
         if (!larger || !(h < infinity)) break;
         h = longest();
     }
+    if (apart <= most_apart) return h;
     if (earlier_terms_decay(c, order, h, each, rtol, atol, size)) return h;
     return reach_by_earlier_terms(x0, each, c, order, rtol, atol, h, size);
 }
