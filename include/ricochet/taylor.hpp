@@ -37,9 +37,9 @@
 namespace ricochet {
 
 /// Taylor's method. The length of a step is known before it is taken, from its last two
-/// coefficients (Jorba and Zou, Experimental Mathematics 14, 2005, section 3.2), or from earlier
-/// ones where these vanish, so that no step is rejected; the polynomial is the dense output and, at
-/// other lengths, the step itself.
+/// coefficients (Jorba and Zou, Experimental Mathematics 14, 2005, section 3.2). Where one of them
+/// vanishes, the flow at the end of the step decides whether the step is repeated with a shorter
+/// length. The polynomial is the dense output and, at other lengths, the step itself.
 struct Taylor {
     /// 12, 16 or 20. 0: by `Options::rtol`, 12 from 1e-8 upward, 16 from 1e-11, else 20; with fixed
     /// steps 20.

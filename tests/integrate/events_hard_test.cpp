@@ -404,7 +404,7 @@ TEST(HardEvents, AGuardThatItsResetHoldsStillDoesNotAccumulate)
 struct Stopped {
     static constexpr std::size_t guard_count = 2;
     Crossing counted = Crossing::falling;
-    std::size_t stop_after = 1;
+    std::uint32_t stop_after = 1;
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const
     {
         if (which == 0) return {};

@@ -596,6 +596,29 @@ TEST(Taylor, FirstStepsAreShortenedWhereTheLastTermsVanishBySymmetry)
     }
 }
 
+/// x' = 1 - t^24, of whose series from t = 0 no term is kept but the first.
+struct LateDecay {
+    using State = std::array<double, 1>;
+    template <class S>
+    constexpr void flow(const S& t, const std::array<S, 1>& /*x*/, std::array<S, 1>& dxdt) const
+    {
+        using std::pow;
+        dxdt[0] = 1.0 - pow(t, 24);
+    }
+};
+
+TEST(Taylor, FirstStepsAreShortenedWhereNoTermThatIsKeptShowsTheFlow)
+{
+    const double exact = 1.5 - std::pow(1.5, 25) / 25;  // -1008.5
+    for (const double tolerance : {1e-6, 1e-9, 1e-12}) {
+        const auto run =
+            integrate(LateDecay{}, LateDecay::State{0},
+                      {.t_end = 1.5, .step = 1.5, .rtol = tolerance, .atol = tolerance},
+                      ErrorControlled<Taylor>{});
+        EXPECT_NEAR(run.x[0], exact, 100 * tolerance * std::fabs(exact));
+    }
+}
+
 /// x' = -1 - root / 10, with the root as a power or as a cube root.
 template <bool is_power>
 struct ThirdPower {

@@ -95,12 +95,13 @@ class TaylorKernel {
     [[nodiscard, gnu::always_inline]] static double length_of(D& of, const State& state,
                                                               double rtol, double atol)
     {
-        const TStep& step = of.step;
+        TStep& step = of.step;
+        step.doubtful = false;
         if (step.is_motion) return std::numeric_limits<double>::infinity();
         RoomFor scratch(of);
         Room& room = scratch.room;
         return find_reach(state.x0, state.component_atol, step.coefficients.data(), step.order,
-                          rtol, atol, room.w);
+                          rtol, atol, room.w, step.doubtful);
     }
 
     static double reach(void* door, State& state, double rtol, double atol)
@@ -152,8 +153,38 @@ class TaylorKernel {
         if (!(longest >= 0)) longest = reach(door, state, rtol, atol);
         if (!go(at(door), state, h)) return std::numeric_limits<double>::quiet_NaN();
         // A step may be longer by millionths, to reach the end of a run.
-        return h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, step.order);
+        const double excess = h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, step.order);
+        return step.doubtful ? excess + defect(at(door), state, rtol, atol) : excess;
     }
+
+    /// The largest difference between the flow at the end of the step and the rate of the series,
+    /// times h and in `most_defect` tolerances; NaN where the flow is not finite.
+    [[gnu::noinline]] static double defect(D& of, State& state, double rtol, double atol)
+    {
+        RoomFor scratch(of);
+        Array& x = scratch.room.w;
+        Array& rate = scratch.room.rate;
+        const std::size_t size = of.step.size();
+        for (std::size_t i = 0; i < size; ++i) x[i] = state.x1[i];
+        ++state.flow_calls;
+        static_cast<void>(call_flow(of.system(), state.mode, state.time(state.h), x, rate));
+        double worst = 0, lost = 0;
+        for (std::size_t i = 0; i < size; ++i) {
+            const double there = state.backward ? -rate[i] : rate[i];
+            const double each = state.component_atol ? state.component_atol[i] : atol;
+            const double largest = std::max(std::fabs(state.x0[i]), std::fabs(x[i]));
+            const double rounding = 64 * std::numeric_limits<double>::epsilon() *
+                                    (std::fabs(there) + std::fabs(state.rate0[i]));
+            const double allowed = most_defect * (each + rtol * largest) + state.h * rounding;
+            const double ratio = state.h * std::fabs(there - state.rate1[i]) / allowed;
+            worst = std::max(worst, ratio);
+            lost += 0 * ratio;
+        }
+        return worst + lost;
+    }
+    /// The last term that is kept contributes its order times the tolerance to the rate, and those
+    /// that are omitted contribute less.
+    static constexpr double most_defect = 100;
 
     static bool take(void* door, State& state, double h)
     {
@@ -371,6 +402,7 @@ class TaylorKernel {
             double h = run.h_next;
             if constexpr (controlled) {
                 step.reach = length_of(at(door), state, run.rtol, run.atol);
+                if (step.doubtful) return;  // the loop takes the step
                 // The loop refuses a step that is still too long.
                 if (!(step.reach >= smallest_step(run.h_min, state.start.value))) return;
                 h = std::min(h, step.reach);

@@ -31,14 +31,14 @@
 
 namespace ricochet::detail {
 
-/// As `find_reach`, where the earlier terms decay.
+/// As `find_reach`.
 /// @param each  absolute tolerances of the components in place of `atol`, or null
-/// @param decays  whether they do
+/// @param agree  whether the last two terms agree
 template <class Pack, std::size_t n>
 [[nodiscard, gnu::always_inline]] inline Pack find_reach(const std::array<Pack, n>& x0,
                                                          const double* each, const Pack* c,
                                                          int order, double rtol, double atol,
-                                                         typename Pack::Mask& decays)
+                                                         typename Pack::Mask& agree)
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     constexpr double least = std::numeric_limits<double>::min();
@@ -83,10 +83,7 @@ template <class Pack, std::size_t n>
         apart = select(going, apart, apart_before);
         going = going & (h < infinity);
     }
-    decays = apart <= most_apart;
-    if ((~decays).any()) {
-        decays = decays | earlier_terms_decay(c, order, h, each, rtol, atol, size);
-    }
+    agree = apart <= most_apart;
     return h;
 }
 
@@ -331,8 +328,8 @@ private:
         const double* const each =
             options_.component_atol.empty() ? nullptr : options_.component_atol.data();
         const Pack* const c = coefficients_.data();
-        Mask decays{};
-        const Pack reach = find_reach(x0_, each, c, order_, options_.rtol, options_.atol, decays);
+        Mask agree{};
+        const Pack reach = find_reach(x0_, each, c, order_, options_.rtol, options_.atol, agree);
         const Pack ulp = std::numeric_limits<double>::epsilon() * size_of(start_);
         const Pack smallest =
             larger_of(options_.h_min, larger_of(4.0 * ulp, std::numeric_limits<double>::min()));
@@ -340,7 +337,7 @@ private:
         const Pack until = in_time((end_ - start_) - start_remainder_);
         Mask fine =
             (active_ & (steps_ < most_steps_)) & ((reach >= smallest) & ~(h * (1 + 1e-6) >= until));
-        fine = fine & decays;
+        fine = fine & agree;  // the end of another step is checked in the lane's own loop
         if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
             fine = fine & ~fine;
         }

@@ -51,128 +51,18 @@ inline constexpr int least_taylor_order = 12;
                       static_cast<std::uint64_t>(static_cast<std::int64_t>(whole) + 1023) << 52);
 }
 
-[[nodiscard, gnu::always_inline]] inline double size_of(double x) noexcept
-{
-    return std::fabs(x);
-}
-[[nodiscard, gnu::always_inline]] inline double larger_of(double x, double y) noexcept
-{
-    return std::max(x, y);
-}
-[[nodiscard, gnu::always_inline]] inline double smaller_of(double x, double y) noexcept
-{
-    return std::min(x, y);
-}
-
-/// Orders before the last two that are compared with them.
-inline constexpr int earlier_orders = 7;
-/// By how much terms of order p - 8 to p - 2 may exceed a geometric series that ends at p: those of
-/// an exponential function do so by p!^(k / p) / k!.
-inline constexpr std::array<std::array<double, earlier_orders>, 3> earlier_weights{
-    {{0.0307, 0.0290, 0.0329, 0.0435, 0.0659, 0.112, 0.212},
-     {0.00881, 0.0117, 0.0172, 0.0277, 0.0490, 0.0936, 0.193},
-     {0.00445, 0.00697, 0.0118, 0.0212, 0.0409, 0.0837, 0.181}}};
-[[nodiscard]] constexpr const std::array<double, earlier_orders>& weights_of_earlier(
-    int order) noexcept
-{
-    return earlier_weights[order <= 12 ? 0 : order <= 16 ? 1 : 2];
-}
-inline constexpr double most_excess = 16;
-/// Two terms that do not vanish give lengths of which one is at most 3/2 of the other; then the
-/// earlier terms need no comparison.
+/// Where the lengths at which the last two terms reach the tolerance differ by more than this power
+/// of two, one of them vanishes, and they say little about the terms that the series omits.
 inline constexpr double most_apart = 0.585;
 
-/// Whether a series that has decayed to the tolerance at h, at its last two terms, has decayed
-/// at the earlier ones as well. The last two say nothing where they vanish by symmetry, as in
-/// series in t^3 or t^6: those of a flow of x^5 from x = 0.
-/// @param size  of the components
-/// @tparam S  double, or several: then the result is one for each
-template <class S, class Array>
-[[nodiscard, gnu::always_inline]] inline auto earlier_terms_decay(const S* c, int order, const S& h,
-                                                                  const double* each, double rtol,
-                                                                  double atol,
-                                                                  const Array& size) noexcept
-{
-    const std::size_t n = size.size();
-    const auto& weights = weights_of_earlier(order);
-    S most(1.0);  // the size of the state, in tolerances
-    for (std::size_t i = 0; i < n; ++i) {
-        const S scale = 1.0 / ((each ? each[i] : atol) + rtol * size[i]);
-        most = larger_of(most, size[i] * scale);
-    }
-    // There the terms of a geometric series have the size of the state.
-    const S far = smaller_of(h, S(1e100)) * rough_exp2(rough_log2(most) * (1.0 / order));
-    const S far2 = far * far;
-    const S far4 = far2 * far2;
-    S power = far4;
-    for (int k = 8; k <= order - 8; k += 4) power *= far4;
-    S sum(0.0);
-    for (std::size_t i = 0; i < n; ++i) {
-        const S scale = 1.0 / ((each ? each[i] : atol) + rtol * size[i]);
-        const S* const ci = c + static_cast<std::size_t>(order - 8) * n + i;
-        S own(0.0);
-        for (std::size_t j = earlier_orders; j-- > 0;) {
-            own = own * far + weights[j] * size_of(ci[j * n]);
-        }
-        sum = larger_of(sum, own * scale);
-    }
-    return (sum == 0.0) | (power * sum <= most_excess * most);
-}
-
-/// The largest h at which the last of the earlier terms that has not decayed at `h` is within the
-/// tolerance: the next one may be the first that the series omits.
-template <class X, class Array>
-[[nodiscard, gnu::noinline]] double reach_by_earlier_terms(const X& x0, const double* each,
-                                                           const double* c, int order, double rtol,
-                                                           double atol, double h, Array& size)
-{
-    constexpr double largest = std::numeric_limits<double>::max();
-    const std::size_t n = size.size();
-    const auto& weights = weights_of_earlier(order);
-    for (std::size_t i = 0; i < n; ++i) size[i] = std::fabs(x0[i]);
-    double reach = h;
-    // As in `find_reach`, the motion may have the size of its end.
-    for (int again = 0; again < 4; ++again) {
-        double most = 1;
-        std::array<double, earlier_orders> terms{};
-        for (std::size_t i = 0; i < n; ++i) {
-            const double scale = 1 / ((each ? each[i] : atol) + rtol * size[i]);
-            most = std::max(most, std::min(size[i] * scale, largest));
-            for (std::size_t j = 0; j < terms.size(); ++j) {
-                const double* const ck = c + (static_cast<std::size_t>(order - 8) + j) * n;
-                terms[j] = std::max(terms[j], std::min(std::fabs(ck[i]) * scale, largest));
-            }
-        }
-        const double allowed = std::log2(most_excess) + std::log2(most);
-        reach = h;
-        for (std::size_t j = terms.size(); j-- > 0;) {
-            if (!(terms[j] > 0)) continue;
-            const double k = order - 8 + static_cast<int>(j);
-            const double term = std::log2(terms[j]);
-            const double far = std::log2(h) + std::log2(most) / order;
-            if (!(std::log2(weights[j]) + term + k * far > allowed)) continue;
-            reach = std::min(h, std::exp2(-term / k));
-            break;
-        }
-        bool larger = false;
-        for (std::size_t i = 0; i < n; ++i) {
-            const double end = std::fabs(x0[i] + std::min(reach, 1e100) * c[n + i]);
-            larger = larger || end > 16 * size[i];
-            size[i] = std::max(size[i], end);
-        }
-        if (!larger || !(reach < h)) break;
-    }
-    return reach;
-}
-
-/// The largest h at which the last two terms stay within atol + rtol |x|, and the earlier ones do
-/// not contradict them.
+/// The largest h at which the last two terms stay within atol + rtol |x|.
 /// @param each  absolute tolerances of the components in the place of `atol`, or null
 /// @param size  scratch, of the size of the state
+/// @param doubtful  whether the last two terms disagree, see `most_apart`
 template <class X, class Array>
 [[nodiscard, gnu::always_inline]] inline double find_reach(const X& x0, const double* each,
                                                            const double* c, int order, double rtol,
-                                                           double atol, Array& size)
+                                                           double atol, Array& size, bool& doubtful)
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     const std::size_t n = size.size();
@@ -211,9 +101,8 @@ template <class X, class Array>
         if (!larger || !(h < infinity)) break;
         h = longest();
     }
-    if (apart <= most_apart) return h;
-    if (earlier_terms_decay(c, order, h, each, rtol, atol, size)) return h;
-    return reach_by_earlier_terms(x0, each, c, order, rtol, atol, h, size);
+    doubtful = !(apart <= most_apart);
+    return h;
 }
 
 /// Identity of the step for which coefficients were computed.
@@ -224,6 +113,7 @@ struct TaylorStepOrigin {
     int order = 0;           ///< of the known coefficients; 0: none
     int asked = 0;           ///< of the run; larger where the motion is a polynomial
     bool is_motion = false;  ///< a polynomial in time, not a truncated series
+    bool doubtful = false;   ///< the end of the step is compared with the flow there
     double reach = std::numeric_limits<double>::quiet_NaN();  ///< [s]; see `StepKernel::reach`
 };
 

@@ -131,7 +131,7 @@ public:
             if (guard_info_of<X>(system, i).stop_after > 1) {
                 throw std::invalid_argument(
                     "integrate: a run that may be handed over counts the events of a guard in "
-                    "each phase anew, and has no stop_after above 1");
+                    "each phase by itself, and has no stop_after above 1");
             }
         }
         run_.t = options.t_start;
