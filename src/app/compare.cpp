@@ -245,7 +245,8 @@ std::string_view reference(const SystemEntry& system)
 std::string times_table(const SystemEntry& system, const std::vector<double>& exact,
                         const std::vector<Method>& methods)
 {
-    constexpr int wide = 22;
+    std::size_t wide = 19;
+    for (const double t : exact) wide = std::max(wide, 1 + fmt::formatted_size("{:.15f}", t));
     std::string labels = fmt::format("{:>3}{:>{}}", "", reference(system), wide);
     std::string steppings = fmt::format("{:>3}{:>{}}", "", "t [s]", wide);
     for (const Method& method : methods) {

@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <limits>
 #include <stdexcept>
 
 #include "../checks/require.hpp"
@@ -40,15 +41,16 @@ void check_contact(int contact, double restitution, double friction, double gap,
 void check_direction(int contact, const Eigen::VectorXd& row, const Eigen::VectorXd& q,
                      const std::function<double(const Eigen::VectorXd&)>& gap)
 {
-    // A difference over s is wrong by s times the curvature of the gap, and by rounding over s: a
-    // hundredth is met over one of these lengths unless the gap bends within 1e-10 of |q|.
+    // A difference over s is wrong by s times the curvature of the gap, and by its rounding over s.
+    // Where the two sides agree best both are small, unless the gap bends within 1e-10 of |q|.
     constexpr double agreement = 0.01;
     if (!row.allFinite()) return;  // the run reports it
     const double size = 1 + q.lpNorm<Eigen::Infinity>();
     const double here = gap(q);
-    Eigen::VectorXd seen;
-    for (const double relative : {1e-6, 1e-3, 1e-9, 1e-12}) {
-        Eigen::VectorXd before = q, after = q;  // one-sided slopes, which differ at a kink
+    double least = std::numeric_limits<double>::infinity();
+    Eigen::VectorXd low, high;  // slopes on both sides, which differ at a kink
+    for (const double relative : {1e-3, 1e-6, 1e-9, 1e-12}) {
+        Eigen::VectorXd before = q, after = q;
         for (Eigen::Index i = 0; i < q.size(); ++i) {
             Eigen::VectorXd at = q;
             at[i] = q[i] - relative * size;
@@ -56,20 +58,21 @@ void check_direction(int contact, const Eigen::VectorXd& row, const Eigen::Vecto
             at[i] = q[i] + relative * size;
             after[i] = (gap(at) - here) / (at[i] - q[i]);
         }
-        if (!before.allFinite() || !after.allFinite()) continue;
-        const Eigen::ArrayXd low = before.cwiseMin(after);
-        const Eigen::ArrayXd high = before.cwiseMax(after);
-        const double off =
-            agreement * std::max({row.lpNorm<Eigen::Infinity>(), before.lpNorm<Eigen::Infinity>(),
-                                  after.lpNorm<Eigen::Infinity>()});
-        if ((row.array() >= low - off && row.array() <= high + off).all()) return;
-        if (seen.size() == 0) seen = (before + after) / 2;
+        const double apart = (after - before).lpNorm<Eigen::Infinity>();
+        if (!(apart <= least)) continue;
+        least = apart;
+        low = before.cwiseMin(after);
+        high = before.cwiseMax(after);
     }
-    if (seen.size() == 0) return;  // the gap has no slope there
+    if (low.size() == 0) return;  // the gap has no slope there
+    const double off =
+        agreement * std::max({row.lpNorm<Eigen::Infinity>(), low.lpNorm<Eigen::Infinity>(),
+                              high.lpNorm<Eigen::Infinity>()});
+    if ((row.array() >= low.array() - off && row.array() <= high.array() + off).all()) return;
     throw std::invalid_argument(
         fmt::format("contact {}: the first row of its directions must be the gradient of its gap, "
                     "about ({:.3g}), got ({:.3g})",
-                    contact, fmt::join(seen, ", "), fmt::join(row, ", ")));
+                    contact, fmt::join((low + high) / 2, ", "), fmt::join(row, ", ")));
 }
 
 }  // namespace detail

@@ -426,7 +426,7 @@ TEST(HardEvents, TheGuardThatEndsARunIsNamedAmongThoseThatFire)
 TEST(HardEvents, AGuardWithoutAResetIsCarriedBackWhetherOrNotItMayEndTheRun)
 {
     // It falls and is carried back at each of the times 1, 2, 3, ...
-    for (const std::size_t events : {1u, 2u, 3u, 4u, 5u}) {
+    for (const std::uint32_t events : {1u, 2u, 3u, 4u, 5u}) {
         const auto run = integrate(Stopped{Crossing::either, events}, X1{1}, {.t_end = 10});
         EXPECT_EQ(run.outcome, Outcome::stopped_by_event) << events;
         EXPECT_NEAR(run.t, static_cast<double>((events + 1) / 2), 1e-14) << events;

@@ -57,11 +57,11 @@ namespace detail {
 void check_contact(int contact, double restitution, double friction, double gap, double room);
 
 /// Validates the first row of `directions` for a contact, `row`, against the gradient of its gap in
-/// the position q. Of differences over several lengths one has to agree, since a gap may be curved
-/// over any length; at a kink the row may lie between the slopes on its sides.
+/// the position q, by differences over the one of several lengths at which both sides agree best;
+/// at a kink the row may lie between the slopes on its sides.
 ///
 /// @param gap  of the contact in a position [m]
-/// @throws std::invalid_argument, naming the contact, if none agrees.
+/// @throws std::invalid_argument, naming the contact, if it disagrees.
 void check_direction(int contact, const Eigen::VectorXd& row, const Eigen::VectorXd& q,
                      const std::function<double(const Eigen::VectorXd&)>& gap);
 
