@@ -55,6 +55,10 @@ void throw_bad_touch(std::string_view who, std::size_t which, std::string_view n
 
 void throw_unknown_mode(std::string_view who, std::size_t mode, std::size_t modes)
 {
+    if (modes == 1) {
+        throw std::invalid_argument(
+            fmt::format("{}: mode must be 0, the only one of the system, got {}", who, mode));
+    }
     throw std::invalid_argument(fmt::format(
         "{}: mode must be below the system's mode_count = {}, got {}", who, modes, mode));
 }

@@ -46,8 +46,45 @@ public:
     [[nodiscard]] virtual double friction(int contact) const = 0;
 };
 
+/// Refuses a system that does not fit, with a sentence for each member. Returns true.
+template <class System>
+[[nodiscard]] consteval bool check_mechanism()
+{
+    using Vector = Eigen::Matrix<double, System::coordinates, 1>;
+    using Square = Eigen::Matrix<double, System::coordinates, System::coordinates>;
+    using Gaps = Eigen::Matrix<double, System::contacts, 1>;
+    using Directions =
+        Eigen::Matrix<double, System::contacts*(1 + System::tangents), System::coordinates>;
+    static_assert(
+        System::tangents == 1 || System::tangents == 2,
+        "ricochet: found tangents outside its range; expected 1 in the plane, 2 in space");
+    static_assert(
+        requires(const System& s, const Vector& q, Square& m) { s.mass(q, m); },
+        "ricochet: found no `mass` that fits; expected void mass(const Vector& q, Square& M) "
+        "const, Eigen matrices of coordinates rows and 1 or coordinates columns");
+    static_assert(
+        requires(const System& s, double t, const Vector& q, Vector& f) { s.force(t, q, q, f); },
+        "ricochet: found no `force` that fits; expected void force(double t, const Vector& q, "
+        "const Vector& v, Vector& F) const, Eigen vectors of coordinates rows");
+    static_assert(
+        requires(const System& s, const Vector& q, Gaps& g) { s.gaps(q, g); },
+        "ricochet: found no `gaps` that fits; expected void gaps(const Vector& q, Gaps& g) const, "
+        "Eigen vectors of coordinates and of contacts rows");
+    static_assert(
+        requires(const System& s, const Vector& q, Directions& h) { s.directions(q, h); },
+        "ricochet: found no `directions` that fits; expected void directions(const Vector& q, "
+        "Matrix& H) const, an Eigen matrix of contacts * (1 + tangents) rows and coordinates "
+        "columns");
+    static_assert(
+        requires(const System& s) { static_cast<double>(s.restitution(0) + s.friction(0)); },
+        "ricochet: found no `restitution` or `friction` that fits; expected double "
+        "restitution(int contact) const and double friction(int contact) const");
+    return true;
+}
+
 template <class System>
 class RICOCHET_ALIGNED TypedMechanism final : public AnyMechanism<System::coordinates> {
+    static_assert(check_mechanism<System>());
     using Any = AnyMechanism<System::coordinates>;
     using Vector = typename Any::Vector;
     static constexpr int C = System::contacts;
