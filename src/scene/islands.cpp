@@ -361,7 +361,7 @@ Vector2 Islands::position(std::uint32_t body, const Instant& t) const
 {
     if (world_.bodies[body].mapped) return disc(body, t).at;
     look_at(islands_[world_.bodies[body].island], t);
-    const std::size_t k = 4 * place_[body];
+    const std::size_t k = std::size_t{4} * place_[body];
     return {at_[k], at_[k + 1]};
 }
 
@@ -369,7 +369,7 @@ Vector2 Islands::velocity(std::uint32_t body, const Instant& t) const
 {
     if (world_.bodies[body].mapped) return disc(body, t).velocity;
     look_at(islands_[world_.bodies[body].island], t);
-    const std::size_t k = 4 * place_[body];
+    const std::size_t k = std::size_t{4} * place_[body];
     return {at_[k + 2], at_[k + 3]};
 }
 
@@ -382,7 +382,7 @@ bool Islands::restart(std::uint32_t which, const Instant& t,
     island.x = at_;
     std::ranges::fill(island.remainder, 0.0);
     for (const auto& [body, velocity] : velocities) {
-        const std::size_t k = 4 * place_[body];
+        const std::size_t k = std::size_t{4} * place_[body];
         island.x[k + 2] = velocity[0];
         island.x[k + 3] = velocity[1];
         const Body& point = world_.bodies[body];

@@ -94,7 +94,7 @@ void Numbers::read_array()
         const PythonError error;
         if (!PyErr_GivenExceptionMatches(error.value(), PyExc_ValueError) &&
             !PyErr_GivenExceptionMatches(error.value(), PyExc_TypeError)) {
-            throw error;
+            throw PythonError(error);
         }
         refuse("a " + type_of(result_));
     }
