@@ -58,7 +58,9 @@ void Islands::join(World& world)
     std::vector<std::uint32_t> parent(count);
     std::iota(parent.begin(), parent.end(), 0U);
     std::vector<char> driven(count, 0);
-    for (std::uint32_t i = 0; i < count; ++i) driven[i] = world.scene.bodies()[i].drag > 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+        driven[i] = world.scene.bodies()[i].drag > 0 ? 1 : 0;
+    }
     for (const Spring& spring : world.scene.springs()) {
         const auto [a, b] = spring.between;
         driven[a.index] = driven[b.index] = 1;
@@ -103,8 +105,8 @@ void Islands::flow(const Island& island, const AnyState& x, AnyState& rate, doub
         rate[4 * m + 3] = world_.gravity[1] - damping * x[4 * m + 3];
     }
     for (const Link& link : island.links) {
-        const std::size_t a = 4 * link.a;
-        const std::size_t b = 4 * link.b;
+        const std::size_t a = std::size_t{4} * link.a;
+        const std::size_t b = std::size_t{4} * link.b;
         const Vector2 apart{x[b] - x[a], x[b + 1] - x[a + 1]};
         const double length = norm(apart);
         if (length == 0) continue;  // no direction, no force

@@ -301,8 +301,8 @@ private:
         part.only(
             {"name", "disc", "point", "at", "velocity", "drag", "material", "grid", "spacing"});
         if (part.has("disc") == part.has("point")) {
-            part.fail(part.has("disc") ? "expected \"disc\" or \"point\" in a body, found both"
-                                       : "expected \"disc\" or \"point\" in a body, found neither");
+            part.fail(part.has("disc") ? R"(expected "disc" or "point" in a body, found both)"
+                                       : R"(expected "disc" or "point" in a body, found neither)");
         }
         Disc disc{.at = part.vector("at"), .radius = 0};
         part.text("name", disc.name);
@@ -320,7 +320,7 @@ private:
         }
         shape.number("mass", disc.mass);
         if (part.has("grid")) return grid(part, disc, point, scene);
-        if (part.has("spacing")) part.fail_at("spacing", "expected \"grid\" with \"spacing\"");
+        if (part.has("spacing")) part.fail_at("spacing", R"(expected "grid" with "spacing")");
         part.ask([&] { add(scene, disc, point); });
     }
 
@@ -346,10 +346,13 @@ private:
             }
         }
         part.ask([&] { scene.require_room(count[0] * count[1]); });
-        for (double y = 0; y < count[1]; ++y) {
-            for (double x = 0; x < count[0]; ++x) {
+        const auto columns = static_cast<std::size_t>(count[0]);
+        const auto rows = static_cast<std::size_t>(count[1]);
+        for (std::size_t y = 0; y < rows; ++y) {
+            for (std::size_t x = 0; x < columns; ++x) {
                 Disc disc = first;
-                disc.at = {first.at[0] + x * spacing[0], first.at[1] + y * spacing[1]};
+                disc.at = {first.at[0] + static_cast<double>(x) * spacing[0],
+                           first.at[1] + static_cast<double>(y) * spacing[1]};
                 if (!disc.name.empty()) disc.name += fmt::format(" {} {}", x, y);
                 part.ask([&] { add(scene, disc, point); });
             }
@@ -391,7 +394,7 @@ private:
         std::string law = "waves";
         part.text("impacts", law);
         if (law != "waves" && law != "together") {
-            part.expected("\"waves\" or \"together\"", "impacts", part.at("impacts"));
+            part.expected(R"("waves" or "together")", "impacts", part.at("impacts"));
         }
         options.impacts = law == "waves" ? ImpactLaw::waves : ImpactLaw::together;
         part.each("sample_times", [&](const json& value, const JsonPath&) {

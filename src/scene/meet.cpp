@@ -14,8 +14,9 @@ namespace {
     Polynomial c{};
     for (int i = 0; i <= path.degree; ++i) {
         for (int j = 0; j <= path.degree; ++j) {
-            c[static_cast<std::size_t>(i + j)] +=
-                dot(path.c[static_cast<std::size_t>(i)], path.c[static_cast<std::size_t>(j)]);
+            const auto a = static_cast<std::size_t>(i);
+            const auto b = static_cast<std::size_t>(j);
+            c[a + b] += dot(path.c[a], path.c[b]);
         }
     }
     c[0] = now.at_once;

@@ -94,7 +94,8 @@ double falls_within(Polynomial c, int degree, double until, double tolerance) no
     if (degree == 0) return never;
     const double end = std::isfinite(until) ? until : bound_of_roots(c, degree);
     const Roots roots = roots_in(c, degree, end);
-    return roots.count > 0 ? roots.at[0] : never;
+    if (roots.count > 0) return roots.at[0];
+    return never;
 }
 
 std::array<double, largest_degree> falls_in(const Polynomial& c, int degree, double until) noexcept
@@ -118,7 +119,8 @@ double falls_again(const Polynomial& c, int degree, double until) noexcept
     if (degree < 2) return never;
     const double end = std::isfinite(until) ? until : bound_of_roots(c, degree);
     const Roots roots = roots_in(c, degree, end);
-    return roots.count > 1 ? roots.at[1] : never;
+    if (roots.count > 1) return roots.at[1];
+    return never;
 }
 
 }  // namespace ricochet::detail

@@ -356,8 +356,8 @@ void Runner::cross(std::uint32_t i)
         grid_.lay_again(world_.bodies, i, pending.cell, place(body, seconds(body.t, now_)));
         return predict(i);
     }
-    const int x = pending.across_x;
-    const int y = pending.across_y;
+    const auto x = static_cast<int>(pending.across_x);
+    const auto y = static_cast<int>(pending.across_y);
     grid_.step(world_.bodies, i, pending.cell, x, y);
     consider_faces(i);
     grid_.each_ahead(world_.bodies, i, pending.cell, x, y,

@@ -271,6 +271,7 @@ bool Runner::divide(std::uint32_t number)
     contacts_.dissolve(number, now_);
     for (const auto& part : staying) {
         std::vector<std::uint32_t> steps;
+        steps.reserve(part.size());
         for (const std::uint32_t i : part) steps.push_back(patience_[i].steps);
         const std::uint32_t next = contacts_.join(part, faces_near(part), steps, now_);
         plan_group(next);

@@ -55,7 +55,7 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
         const auto group = groups[number];
         const std::size_t known = run.events.size();
         // One group seldom adds more than half of the present number.
-        if (2 * known > run.events.capacity()) {
+        if (number > 0 && 2 * known > run.events.capacity()) {
             const std::size_t alike = known / number * groups.size();
             reserve_large(run.events, std::clamp(alike + alike / 8, 4 * known, 64 * known));
         }
@@ -111,7 +111,7 @@ SceneRun run_until(const Scene& scene, const SceneOptions& options, const SceneT
 struct Key {
     double t;
     std::size_t index;
-    friend auto operator<=>(const Key&, const Key&) = default;
+    friend auto operator<=>(const Key&, const Key&) = default;  // NOLINT(modernize-use-nullptr)
 };
 
 /// Sorts events by time and, at one time, in their present order: first into intervals of the run

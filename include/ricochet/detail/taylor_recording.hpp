@@ -97,7 +97,7 @@ public:
     }
     constexpr void pop_back() noexcept { --size_; }
     [[nodiscard]] constexpr int size() const noexcept { return size_; }
-    [[nodiscard]] constexpr T& operator[](int i) noexcept { return items_[i]; }
+    [[nodiscard]] constexpr T& operator[](int i) noexcept { return items_[i]; }  // NOLINT
     [[nodiscard]] constexpr const T& operator[](int i) const noexcept { return items_[i]; }
     [[nodiscard]] constexpr T& back() noexcept { return items_[size_ - 1]; }
 

@@ -186,7 +186,8 @@ private:
         }
         velocity_.noalias() += inverse_ * p_;
         for (std::size_t k = 0; k < closed_.size(); ++k) {
-            impulse_.segment(closed_[k] * D, D) = p_.segment(static_cast<Eigen::Index>(k) * D, D);
+            const Eigen::Index first = static_cast<Eigen::Index>(closed_[k]) * D;
+            impulse_.segment(first, D) = p_.segment(static_cast<Eigen::Index>(k) * D, D);
         }
         return true;
     }
