@@ -72,7 +72,8 @@ public:
     [[nodiscard]] static constexpr double switch_time(int n) noexcept
     {
         constexpr long double log_two = 0.693147180559945309417232121458L;
-        return static_cast<double>((3 * (n / 2) + (n % 2 == 0 ? 1 : 3)) * log_two);
+        const int cycles = n / 2;
+        return static_cast<double>((3 * cycles + (n % 2 == 0 ? 1 : 3)) * log_two);
     }
 };
 
