@@ -68,6 +68,7 @@ TEST(Islands, DumbbellsWithOwnStepsStrikeAsInOneState)
                                      {.at = {3, 0.2}, .velocity = {-1, 0.1}, .radius = radius},
                                      {.at = {3, 1.0}, .velocity = {-0.5, 0}, .radius = radius}}};
     std::vector<BodyId> ids;
+    ids.reserve(discs.size());
     for (const Disc& disc : discs) ids.push_back(scene.disc(disc));
     scene.spring({.between = {ids[0], ids[1]}, .rest = 1, .stiffness = 1000});
     scene.spring({.between = {ids[2], ids[3]}, .rest = 1, .stiffness = 20});

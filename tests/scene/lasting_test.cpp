@@ -26,7 +26,8 @@ Scene above_bin(double restitution, double friction, const std::vector<std::size
     for (std::size_t k = 0; k < 12; ++k) {
         const std::size_t i = order.empty() ? k : order[k];
         const auto column = static_cast<double>(i % 3);
-        const auto row = static_cast<double>(i / 3);
+        const std::size_t below = i / 3;
+        const auto row = static_cast<double>(below);
         scene.disc({.at = {0.13 + 0.22 * column + 0.003 * static_cast<double>(i % 4) - 0.001 * row,
                            0.3 + 0.25 * row},
                     .radius = 0.08 + 0.01 * column,

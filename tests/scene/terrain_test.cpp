@@ -176,7 +176,7 @@ TEST(Terrain, ElasticPointsWithFrictionComeToRestInACorner)
 {
     // Friction leads them into hops that strike both sides at a right angle, lower than the
     // rounding of their place.
-    for (const std::uint64_t seed : {20506, 31829, 50995, 66179, 115630}) {
+    for (const std::uint64_t seed : {20506U, 31829U, 50995U, 66179U, 115630U}) {
         stays_inside(seed, 0);
         const Trial made = trial(seed, 0);
         EXPECT_TRUE(run_of(made, nullptr, {}).bodies[0].asleep) << "seed " << seed;
