@@ -42,8 +42,9 @@ inline Scene gas(const Gas& wanted, const std::vector<std::size_t>& order = {})
         disc.radius = radius * (1 + wanted.spread * uniform(generator));
         disc.mass = 1 + wanted.spread * uniform(generator);
         const double play = pitch / 2 - disc.radius;
-        disc.at = {(static_cast<double>(i % columns) + 0.5) * pitch + play * uniform(generator),
-                   (static_cast<double>(i / columns) + 0.5) * pitch + play * uniform(generator)};
+        const std::size_t column = i % columns, row = i / columns;
+        disc.at = {(static_cast<double>(column) + 0.5) * pitch + play * uniform(generator),
+                   (static_cast<double>(row) + 0.5) * pitch + play * uniform(generator)};
         disc.velocity = {uniform(generator), uniform(generator)};
         disc.material = material;
     }
