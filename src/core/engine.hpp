@@ -329,8 +329,9 @@ protected:
     /// not rise above its rounding any more.
     [[nodiscard]] bool fades(std::size_t i);
 
-    /// Whether guard i keeps its value, but for its rounding, while the flow goes `ahead` [s].
-    [[nodiscard]] bool stands_still(std::size_t i, double ahead, double rounding);
+    /// Rate of guard i after the motion has gone straight on for `ahead` [s].
+    /// @param scale  of differences, as in `SystemTable::rate`
+    [[nodiscard]] double rate_ahead(std::size_t i, double ahead, double scale);
 
     /// How far from its surface the reset has put guard i, positive on the side that it came from.
     [[nodiscard]] double distance_put_back(std::size_t i);

@@ -67,7 +67,11 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
             }
             // A difference of a unit in the last place does not determine the direction.
             lost = std::fabs(rate) * part <= rounding / 8;
-            if (lost && came_far && !jump_lost && stands_still(i, part, rounding)) return false;
+            // It stands still where its reset has put it, to second order.
+            if (lost && came_far && !jump_lost &&
+                std::fabs(rate_ahead(i, part, 1e5 * part)) * part <= rounding / 8) {
+                return false;
+            }
             if (lost) rate = 0;
         }
     }
@@ -77,20 +81,6 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
     if (record.turned) record.intervals.depart(rate, low);
     if (jump_lost && located_ && (lost || !record.turned)) return true;
     return low && !came_far && record.intervals.fades(rounding);
-}
-
-template <class X, bool single>
-inline bool EventEngine<X, single>::stands_still(std::size_t i, double ahead, double rounding)
-{
-    X& later = resets_.after();
-    X& rate_later = resets_.scratch();
-    assign(later, step_.x0());
-    assign(rate_later, step_.x0());
-    move(later, step_.x0(), ahead, step_.rate0());
-    step_.flow(ahead, later, rate_later);
-    const double rate = bank_.view(i, step_.mode(), calls())
-                            .rate(step_.time(ahead), later, rate_later, 1e5 * ahead);
-    return std::fabs(rate) * ahead <= rounding / 8;
 }
 
 template <class X, bool single>

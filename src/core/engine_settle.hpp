@@ -231,14 +231,7 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
     // The second derivative has the sign that the rate will have a little later. A rate that it
     // cancels within the rounding of the time counts as zero, as does a rate that is only rounding.
     const double delta = 1e-6 * h_next_;
-    X& later = resets_.after();
-    X& rate_later = resets_.scratch();
-    assign(later, step_.x0());
-    assign(rate_later, step_.x0());
-    move(later, step_.x0(), delta, step_.rate0());
-    step_.flow(delta, later, rate_later);
-    const double next =
-        bank_.view(i, step_.mode(), calls()).rate(step_.time(delta), later, rate_later, h_next_);
+    const double next = rate_ahead(i, delta, h_next_);
     const double moment =
         64 * std::numeric_limits<double>::epsilon() * (std::fabs(step_.time(0)) + h_next_);
     double noise = std::fabs(next - rate) * std::min(moment / delta, 0.5);
@@ -249,6 +242,18 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
     const Side side = std::fabs(next) > noise ? side_of(next) : Side::plateau;
     bank_.set_rate0(i, sign_of(side) * std::numeric_limits<double>::min());
     return side;
+}
+
+template <class X, bool single>
+inline double EventEngine<X, single>::rate_ahead(std::size_t i, double ahead, double scale)
+{
+    X& later = resets_.after();
+    X& rate_later = resets_.scratch();
+    assign(later, step_.x0());
+    assign(rate_later, step_.x0());
+    move(later, step_.x0(), ahead, step_.rate0());
+    step_.flow(ahead, later, rate_later);
+    return bank_.view(i, step_.mode(), calls()).rate(step_.time(ahead), later, rate_later, scale);
 }
 
 template <class X, bool single>

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <unordered_map>
@@ -405,26 +404,6 @@ private:
 
     std::unordered_map<std::string, MaterialId> materials_;
 };
-
-/// The line of the first number that is too large for a double.
-std::size_t line_of_large_number(std::string_view text)
-{
-    bool inside = false;
-    for (std::size_t at = 0; at < text.size(); ++at) {
-        const char c = text[at];
-        if (inside && c == '\\') {
-            ++at;
-        } else if (c == '"') {
-            inside = !inside;
-        } else if (!inside && c >= '0' && c <= '9') {
-            const std::size_t end = text.find_first_not_of("0123456789+-.eE", at);
-            const std::string number(text.substr(at, end - at));
-            if (std::isinf(std::strtod(number.c_str(), nullptr))) return line_of_byte(text, at);
-            at += number.size() - 1;
-        }
-    }
-    return 1;
-}
 
 /// The line to which a parser's message refers, by a count of bytes or the name of a key.
 std::size_t line_of_trouble(std::string_view text, std::string_view message)

@@ -1,6 +1,8 @@
 #include "scene/json_lines.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdlib>
 #include <utility>
 
 namespace ricochet::detail {
@@ -125,7 +127,11 @@ std::size_t line_of_repeated(std::string_view text, std::string_view key)
     return byte == 0 ? 0 : line_of_byte(text, byte);
 }
 
-std::size_t line_of_depth(std::string_view text, int levels)
+namespace {
+
+/// The line of the first byte outside of strings for which `stops(index)` is true, else 1.
+template <class Stops>
+[[nodiscard]] std::size_t line_outside_strings(std::string_view text, const Stops& stops)
 {
     bool inside = false;
     for (std::size_t at = 0; at < text.size(); ++at) {
@@ -134,13 +140,36 @@ std::size_t line_of_depth(std::string_view text, int levels)
             ++at;
         } else if (c == '"') {
             inside = !inside;
-        } else if (!inside && (c == '{' || c == '[')) {
-            if (levels-- == 0) return line_of_byte(text, at);
-        } else if (!inside && (c == '}' || c == ']')) {
-            ++levels;
+        } else if (!inside && stops(at)) {
+            return line_of_byte(text, at);
         }
     }
     return 1;
+}
+
+}  // namespace
+
+std::size_t line_of_depth(std::string_view text, int levels)
+{
+    return line_outside_strings(text, [&](std::size_t at) {
+        const char c = text[at];
+        if (c == '{' || c == '[') return levels-- == 0;
+        if (c == '}' || c == ']') ++levels;
+        return false;
+    });
+}
+
+std::size_t line_of_large_number(std::string_view text)
+{
+    constexpr std::string_view of_numbers = "0123456789+-.eE";
+    const auto continues = [&](std::size_t at) {
+        return at < text.size() && of_numbers.find(text[at]) != std::string_view::npos;
+    };
+    return line_outside_strings(text, [&](std::size_t at) {
+        if (!continues(at) || (at > 0 && continues(at - 1))) return false;
+        const std::size_t end = text.find_first_not_of(of_numbers, at);
+        return std::isinf(std::strtod(std::string(text.substr(at, end - at)).c_str(), nullptr));
+    });
 }
 
 }  // namespace ricochet::detail

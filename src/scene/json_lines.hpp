@@ -25,4 +25,7 @@ using JsonPath = std::vector<std::variant<std::string, std::size_t>>;
 /// The line on which more than `levels` lists and objects are open.
 [[nodiscard]] std::size_t line_of_depth(std::string_view text, int levels);
 
+/// The line of the first number that is too large for a double.
+[[nodiscard]] std::size_t line_of_large_number(std::string_view text);
+
 }  // namespace ricochet::detail

@@ -299,11 +299,9 @@ private:
             run_.outcome = Outcome::wrong_dimension;
             return false;
         }
-        for (const double component : event.after) {
-            if (!std::isfinite(component)) {
-                run_.outcome = Outcome::non_finite;
-                return false;
-            }
+        if (!detail::all_finite(event.after)) {
+            run_.outcome = Outcome::non_finite;
+            return false;
         }
         return true;
     }
