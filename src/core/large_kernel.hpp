@@ -124,6 +124,12 @@ class LargeKernel {
         return reinterpret_cast<Four>(reinterpret_cast<Bits>(x) & all_but_sign);
     }
 
+    [[nodiscard, gnu::always_inline]] static bool any_zero(double x) noexcept { return x == 0; }
+    [[nodiscard, gnu::always_inline]] static bool any_zero(const Four& x) noexcept
+    {
+        return x[0] == 0 || x[1] == 0 || x[2] == 0 || x[3] == 0;
+    }
+
     template <bool with_error>
     [[nodiscard, gnu::always_inline]] static auto error_weights([[maybe_unused]] double h) noexcept
     {
@@ -189,14 +195,24 @@ class LargeKernel {
         [[nodiscard, gnu::always_inline]] V ratio_of(std::size_t i, const V& start, const V& end,
                                                      const V& departing) const
         {
-            const V error =
-                magnitude(Method::template sum_of<typename Method::Errors>(weights, [&](auto j) {
-                    if constexpr (j <= last) {
-                        return load<V>(k[j - 1] + i);
-                    } else {
-                        return departing;
-                    }
-                }));
+            const auto rates = [&](auto j) {
+                if constexpr (j <= last) {
+                    return load<V>(k[j - 1] + i);
+                } else {
+                    return departing;
+                }
+            };
+            V error = magnitude(Method::template sum_of<typename Method::Errors>(weights, rates));
+            if constexpr (Method::estimates_quadrature) {
+                if (any_zero(error)) {
+                    using Row = typename Method::QuadratureErrors;
+                    const auto others = Method::template weights_of<Row>(h);
+                    const V other = magnitude(Method::template sum_of<Row>(others, rates));
+                    constexpr auto twins = Method::Coefficients::twins;
+                    const V apart = load<V>(k[twins[0] - 1] + i) - load<V>(k[twins[1] - 1] + i);
+                    error = error + magnitude(apart) == 0 ? other : error;
+                }
+            }
             const V size0 = magnitude(start);
             const V size1 = magnitude(end);
             const V at_zero = each ? load<V>(each + i) : V{} + atol;

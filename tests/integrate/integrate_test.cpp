@@ -8,6 +8,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/locate/locators.hpp"
@@ -227,6 +228,41 @@ TEST(Integrate, TheEndIsHitExactlyByStepsThatDoNotDivideIt)
     const auto tenths =
         integrate(Clock{}, X{0.0, 0.0}, {.t_end = 1, .step = 0.1}, FixedStep<Rk4>{});
     EXPECT_EQ(tenths.statistics.steps, 10u) << "no step for a remainder of rounding";
+}
+
+/// x' = 1 / (1e-4 + (t - 1)^2) in every component but the first, which stands still: a peak 0.01
+/// wide, of area 100 (atan 200 + atan 100) from t = 0 to 3.
+template <class State>
+struct Peak {
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            dxdt[i] = i == 0 ? 0 : 1 / (1e-4 + (t - 1) * (t - 1));
+        }
+    }
+};
+
+TEST(Integrate, AQuadratureHasAnErrorEstimateWithEveryMethod)
+{
+    const double area = 100 * (std::atan(200.0) + std::atan(100.0));
+    const auto check = [&]<class State>(State start, auto method) {
+        const auto run =
+            integrate(Peak<State>{}, start, {.t_end = 3, .rtol = 1e-9, .atol = 1e-9}, method);
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
+        EXPECT_EQ(run.x[0], 0);
+        for (std::size_t i = 1; i < start.size(); ++i) {
+            // Every step adds at most rtol |x| + atol; no estimate of these is too small here.
+            EXPECT_NEAR(run.x[i], area, 1e-9 * (area + 1) * double(run.statistics.steps)) << i;
+        }
+        EXPECT_GT(run.statistics.steps, 10u);
+    };
+    check(X{}, ErrorControlled<Fehlberg78>{});
+    check(X{}, ErrorControlled<Dopri5>{});
+    check(X{}, ErrorControlled<CashKarp54>{});
+    // Two blocks of four components, and three.
+    check(std::vector<double>(11), ErrorControlled<Fehlberg78>{});
+    check(std::vector<double>(11), ErrorControlled<Dopri5>{});
+    check(std::vector<double>(11), ErrorControlled<MethodByName>{{MethodName::fehlberg78}});
 }
 
 TEST(Integrate, AnEmptyIntervalReturnsTheStart)

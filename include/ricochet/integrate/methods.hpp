@@ -51,9 +51,10 @@ struct Dopri5 {
 };
 
 /// Fehlberg's method of order 8, the cheapest for small errors. Its error estimate, a multiple of
-/// k1 + k11 - k12 - k13, is blind to components whose rate depends on time alone: k1 and
-/// k12 are taken at the start of the step, k11 and k13 at its end. Where such quadratures
-/// stand alone, use Dopri5, or bound the step by `Options::h_max`.
+/// k1 + k11 - k12 - k13, vanishes for components whose rate depends on time alone: k1 and k12 are
+/// taken at the start of the step, k11 and k13 at its end. Where it is zero, the sixth difference
+/// of the rates takes its place. Where the rate depends on the state, but very weakly, it is too
+/// small: use Dopri5 there, or bound the step by `Options::h_max`.
 struct Fehlberg78 {
     template <class State>
     using Stepper = detail::RungeKutta<detail::Fehlberg78Tableau, State>;
