@@ -60,6 +60,7 @@ public:
 
     /// Marks the island of one body that can meet neither a body nor a surface.
     void set_unseen(std::uint32_t island) { islands_[island].unseen = !islands_[island].system; }
+    [[nodiscard]] bool unseen(std::uint32_t island) const { return islands_[island].unseen; }
 
     // --- systems: the members of such an island are the discs of one system ---
 

@@ -97,13 +97,17 @@ Path World::path(std::uint32_t i, const Instant& t) const
     }
     const auto& [c3, c4] = bends[i];
     const Vector2 c2 = 0.5 * b.a;
+    path.degree = 4;
+    path.until = std::max(0.0, seconds(t, islands->end(b.island)));
+    if (s == 0) {
+        path.c = {b.p, b.v, c2, c3, c4};
+        return path;
+    }
     path.c[0] = b.p + s * (b.v + s * (c2 + s * (c3 + s * c4)));
     path.c[1] = b.v + s * (2 * c2 + s * (3 * c3 + 4 * s * c4));
     path.c[2] = c2 + s * (3 * c3 + 6 * s * c4);
     path.c[3] = c3 + 4 * s * c4;
     path.c[4] = c4;
-    path.degree = 4;
-    path.until = std::max(0.0, seconds(t, islands->end(b.island)));
     return path;
 }
 

@@ -13,19 +13,21 @@ struct Roots {
     void add(double s) { at[static_cast<std::size_t>(count++)] = s; }
 };
 
-/// The root between a and b, where the values have opposite signs.
-double root_between(const Polynomial& c, int degree, double a, double b)
+/// The root between a and b, where the values fa and fb have opposite signs: Newton's method from
+/// where the secant ends, or halves where it leads outside.
+double root_between(const Polynomial& c, int degree, double a, double fa, double b, double fb)
 {
-    double fa = value_of(c, degree, a);
-    double s = 0.5 * (a + b);
+    const double secant = a + (b - a) * (fa / (fa - fb));
+    double s = secant > a && secant < b ? secant : 0.5 * (a + b);
     for (int i = 0; i < 200; ++i) {
-        const double f = value_of(c, degree, s);
+        double f = c[static_cast<std::size_t>(degree)];
+        double rate = 0;
+        for (int k = degree - 1; k >= 0; --k) {
+            rate = rate * s + f;
+            f = f * s + c[static_cast<std::size_t>(k)];
+        }
         if (f == 0) return s;
         ((f < 0) == (fa < 0) ? a : b) = s;
-        double rate = 0;
-        for (int k = degree; k > 0; --k) {
-            rate = rate * s + k * c[static_cast<std::size_t>(k)];
-        }
         double next = s - f / rate;
         if (!(next > a && next < b)) next = 0.5 * (a + b);
         if (next == s || next <= a || next >= b) return next;
@@ -35,6 +37,16 @@ double root_between(const Polynomial& c, int degree, double a, double b)
     return s;
 }
 
+/// Whether the lowest coefficients prove that the slope has no root in (0, until].
+bool is_monotone(const Polynomial& c, int degree, double until)
+{
+    double other = 0;
+    for (int k = degree; k > 1; --k) {
+        other = (other + k * std::fabs(c[static_cast<std::size_t>(k)])) * until;
+    }
+    return std::fabs(c[1]) > other;
+}
+
 /// All roots in (0, until], from those of the derivative, between which the polynomial is monotone.
 Roots roots_in(const Polynomial& c, int degree, double until)
 {
@@ -42,7 +54,7 @@ Roots roots_in(const Polynomial& c, int degree, double until)
     while (degree > 0 && c[static_cast<std::size_t>(degree)] == 0) --degree;
     if (degree == 0) return roots;
     Roots turns;
-    if (degree > 1) {
+    if (degree > 1 && !is_monotone(c, degree, until)) {
         Polynomial slope{};
         for (int k = 1; k <= degree; ++k) {
             slope[static_cast<std::size_t>(k - 1)] = k * c[static_cast<std::size_t>(k)];
@@ -55,7 +67,7 @@ Roots roots_in(const Polynomial& c, int degree, double until)
         const double to = k < turns.count ? turns.at[static_cast<std::size_t>(k)] : until;
         const double f_to = value_of(c, degree, to);
         if ((f_from > 0 && f_to <= 0) || (f_from < 0 && f_to >= 0)) {
-            roots.add(f_to == 0 ? to : root_between(c, degree, from, to));
+            roots.add(f_to == 0 ? to : root_between(c, degree, from, f_from, to, f_to));
         }
         from = to;
         f_from = f_to;

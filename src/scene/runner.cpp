@@ -139,18 +139,32 @@ void Runner::fail_island(std::uint32_t island)
          fmt::format("the step of the island of {} fell below what the time resolves", first));
 }
 
+/// Whether nothing but a body's steps happens up to t: no sample, no end of the run, no cancelling.
+bool Runner::nothing_before(const Instant& t) const
+{
+    const auto& times = world_.options.sample_times;
+    if (next_sample_ < times.size() && !before(t, {times[next_sample_], 0})) return false;
+    const auto* cancelled = world_.options.cancelled;
+    if (cancelled && cancelled->load(std::memory_order_relaxed)) return false;
+    return before(t, t_end_);
+}
+
 void Runner::step_island(std::uint32_t island)
 {
     Islands& islands = *world_.islands;
     const auto id = static_cast<std::uint32_t>(world_.bodies.size()) + island;
-    if (!islands.advance(island)) return fail_island(island);
-    if (islands.stalls(island)) {
-        return fail(Outcome::stalled, islands.members(island),
-                    fmt::format("the steps of the island of {} are shorter than 1e-8 of the run: "
-                                "its drag or a spring is too stiff for the method",
-                                called(islands.members(island)[0])));
-    }
     const Instant& end = islands.end(island);
+    for (;;) {
+        if (!islands.advance(island)) return fail_island(island);
+        if (islands.stalls(island)) {
+            return fail(Outcome::stalled, islands.members(island),
+                        fmt::format("the steps of the island of {} are shorter than 1e-8 of the "
+                                    "run: its drag or a spring is too stiff for the method",
+                                    called(islands.members(island)[0])));
+        }
+        if (!islands.unseen(island) || !nothing_before(end)) break;
+        now_ = end;
+    }
     calendar_.set(id, before(end, t_end_) ? end : no_instant);
     for (const std::uint32_t i : islands.members(island)) predict(i);
 }

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <vector>
 
@@ -104,6 +105,31 @@ TEST(Islands, DragSlowsAsInTheClosedForm)
     EXPECT_NEAR(run.events[0].t, 2 * std::log(4.0), 1e-9);
     EXPECT_NEAR(run.events[0].after[0][0], -0.25, 1e-9);
     EXPECT_NEAR(run.samples[0][0].at[0], 2 * (1 - std::exp(-0.5)), 1e-9);
+}
+
+TEST(Islands, ABodyThatCanMeetNothingTakesTheSameSteps)
+{
+    std::vector<double> times{0};
+    for (int k = 1; k <= 300; ++k) times.push_back(0.1 * k);
+    std::atomic<bool> cancelled = false;
+    const auto run = [&](bool wall, double t_end) {
+        Scene scene({.gravity = {0, -9.81}});
+        if (wall) scene.wall({.point = {0, -1e6}, .normal = {0, 1}});
+        scene.disc({.at = {0, 0}, .velocity = {3, 4}, .radius = 0.1, .drag = 0.1});
+        return simulate(scene, {.t_end = t_end, .sample_times = times, .cancelled = &cancelled});
+    };
+    const SceneRun alone = run(false, 30);
+    const SceneRun above = run(true, 30);
+    EXPECT_EQ(alone.statistics.steps, above.statistics.steps);
+    EXPECT_EQ(alone.bodies[0].at, above.bodies[0].at);
+    ASSERT_EQ(alone.samples.size(), times.size());
+    for (std::size_t k = 0; k < times.size(); ++k) {
+        EXPECT_EQ(alone.samples[k][0].at, above.samples[k][0].at) << times[k];
+        EXPECT_EQ(alone.samples[k][0].velocity, above.samples[k][0].velocity) << times[k];
+    }
+    times.clear();
+    cancelled = true;
+    EXPECT_EQ(run(false, 1e9).outcome, Outcome::cancelled);
 }
 
 TEST(Islands, AnIslandTakesTheSameStepsWhateverElseMoves)
