@@ -217,6 +217,12 @@ int main()
 // CASE 27 alone: found a locator in the place of the detector
 #elif CASE == 27
     Simulation simulation(falling, x0, {.t_end = 1}, FixedStep<Rk4>{}, Toms748{});
+// CASE 31: found no stepping behind the options; expected ErrorControlled<Method> or FixedStep
+#elif CASE == 31
+    (void)integrate(falling, x0, {.t_end = 1}, Fehlberg78{});
+// CASE 32: found no stepping behind the options
+#elif CASE == 32
+    Simulation simulation(falling, x0, {.t_end = 1}, Extremum{});
 #elif CASE == 28 || CASE == 29
     EventMonitor monitor(falling, x0);
     return static_cast<int>(monitor.examine(Step(Instant{0}, 1, x0, x0, x0, x0)));

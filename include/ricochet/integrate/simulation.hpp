@@ -38,6 +38,10 @@ namespace detail {
 /// Parts of a run besides its start and its options, at addresses that do not change.
 template <class System, class X, class Stepping, class Detector, class Locator>
 class PartsOfRun {
+    static_assert(
+        requires { typename Stepping::method; },
+        "ricochet: found no stepping behind the options; expected ErrorControlled<Method> or "
+        "FixedStep<Method>, such as ErrorControlled<Fehlberg78>{}");
     using Method = typename Stepping::method;
     using C = CoreState<X>;
     static constexpr bool error_controlled = std::is_same_v<Stepping, ErrorControlled<Method>>;
