@@ -76,9 +76,12 @@ protected:
 
     // --- set-up ---
 
+    /// Number of modes; 0: not declared. A system without modes is always in mode 0.
+    [[nodiscard]] std::size_t modes() const { return system_->moded ? system_.modes() : 1; }
+
     void refuse_bad_modes() const
     {
-        const std::size_t modes = system_.modes();
+        const std::size_t modes = this->modes();
         if (modes > 0 && options_.mode >= modes) throw_unknown_mode(who_, options_.mode, modes);
     }
 

@@ -67,7 +67,7 @@ inline void Loop<X, single>::refuse_bad_place() const
     require(std::isfinite(flight_start_) && longest_step_ >= 0 && std::isfinite(longest_step_),
             "the last event");
     require(ended_ || lies_before(place_.t.value, time_event_) || !timed_, "the next time event");
-    const std::size_t modes = system_.modes();
+    const std::size_t modes = this->modes();
     require(modes == 0 || place_.mode < modes, "the mode");
 }
 

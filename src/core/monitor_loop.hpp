@@ -114,7 +114,7 @@ public:
         }
         require_finite(step_.start(), after);
         require_length("the scale of `resume`", scale);
-        const std::size_t modes = system_.modes();
+        const std::size_t modes = this->modes();
         if (modes > 0 && mode >= modes) throw_unknown_mode(who, mode, modes);
         step_.restart(step_.start(), after, mode);
         return resume(dxdt, scale);
@@ -437,7 +437,7 @@ private:
         require(all_finite(place_.x) && all_finite(place_.remainder), "the state");
         require(!timed_ || lies_before(place_.t.value, time_event_), "the next time event");
         require(h_next_ > 0 && std::isfinite(h_next_), "the scale");
-        const std::size_t modes = system_.modes();
+        const std::size_t modes = this->modes();
         require(modes == 0 || place_.mode < modes, "the mode");
     }
 

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "problems/near_tangent.hpp"
+#include "refusal.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/locators.hpp"
@@ -573,6 +574,15 @@ TEST(Events, AModeThatDoesNotExistEndsTheRun)
     EXPECT_NEAR(run.t, 1.0536, 1e-4);
     EXPECT_THROW((void)integrate(Thermostat{}, X1{20}, {.t_end = 18, .mode = 2}),
                  std::invalid_argument);
+}
+
+TEST(Events, ASystemWithoutModesIsInModeZero)
+{
+    const BouncingBall ball;
+    EXPECT_EQ(refusal([&] {
+                  (void)integrate(ball, BouncingBall::State{1, 0}, {.t_end = 1, .mode = 3});
+              }),
+              "integrate: mode must be 0, the only one of the system, got 3");
 }
 
 /// A rod that breaks in two: the state (x, v) becomes (x1, v1, x2, v2).

@@ -879,6 +879,10 @@ TEST(MonitorRefusals, StartsAndArraysThatAreNone)
               "guard >= 0 at t = 0, got -1");
     EXPECT_THROW(monitor.start(Instant{0}, X{1, 0}, X{}, 0), std::invalid_argument);
     EXPECT_THROW(monitor.start(Instant{0}, X{1, 0}, X{}, inf), std::invalid_argument);
+    EXPECT_EQ(refusal([&] {
+                  monitor.start(Instant{0}, X{1, 0}, X{}, 0.1, 1);
+              }),
+              "EventMonitor: mode must be 0, the only one of the system, got 1");
     EXPECT_THROW((void)monitor.side(1), std::out_of_range);
     EXPECT_EQ(refusal([&] { (void)EventMonitor(ball, X{}, {.event_tolerance = -1}); }),
               "EventMonitor: event_tolerance must be zero or positive, and finite, got -1");
