@@ -14,6 +14,7 @@
 #include <memory>
 #include <new>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 #include <string_view>
 
@@ -115,7 +116,10 @@ int run(const AddCommands& add, int count, char** arguments)
     try {
         app.parse(count, arguments);
     } catch (const CLI::Success& success) {  // --help, --version
-        return app.exit(success);
+        std::ostringstream text;
+        const int code = app.exit(success, text);
+        print(text.str());
+        return code;
     } catch (const CLI::ParseError& error) {
         throw BadInput(error.what());
     }

@@ -219,6 +219,23 @@ TEST_F(Robust, FilesAreWrittenThoughNothingPrintedIsRead)
     EXPECT_EQ(files(), Words{"ball.csv"});
 }
 
+/// Runs a command of a shell, in the directory of the test; returns its status.
+int shell(const fs::path& directory, const std::string& command)
+{
+    const int status = std::system(("cd '" + directory.string() + "' && " + command).c_str());
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST_F(Robust, HelpThatCannotBePrintedIsAnError)
+{
+    if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
+    for (const char* command : {" --help", " --version", " simulate --help"}) {
+        EXPECT_EQ(shell(work(), std::string(RICOCHET_APP) + command + " >/dev/null"), 0) << command;
+        EXPECT_EQ(shell(work(), std::string(RICOCHET_APP) + command + " >/dev/full 2>/dev/null"), 1)
+            << command;
+    }
+}
+
 TEST_F(Robust, APipeIsWaitedForUntilAnInterrupt)
 {
     ASSERT_EQ(::mkfifo((work() / "pipe").c_str(), 0600), 0);
@@ -229,13 +246,6 @@ TEST_F(Robust, APipeIsWaitedForUntilAnInterrupt)
     const pid_t child = start(simulate({"--csv", "pipe"}));
     EXPECT_TRUE(content(work() / "pipe").starts_with("t [s],"));
     EXPECT_EQ(wait_for(child).status, 0);
-}
-
-/// Runs a command of a shell, in the directory of the test; returns its status.
-int shell(const fs::path& directory, const std::string& command)
-{
-    const int status = std::system(("cd '" + directory.string() + "' && " + command).c_str());
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
 TEST_F(Robust, StandardErrorThatTakesNothingChangesNoStatus)
