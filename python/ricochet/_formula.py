@@ -17,6 +17,27 @@ _a_number = _refused("a number wanted of a symbol, as by functions of math",
                      "functions of NumPy, such as np.sin")
 
 
+def _apply(inputs, ufunc, method, options):
+    """A function of NumPy of arrays and symbols."""
+    given = [np.asarray(x).astype(object) for x in inputs]  # of Python's numbers
+    if ufunc in (np.arctan2, np.hypot):
+        # NumPy calls these as methods of the first operand, which numbers do not have.
+        tape = next(x._tape for y in given for x in y.flat if isinstance(x, Symbol))
+        as_symbol = np.frompyfunc(tape.symbol, 1, 1)
+        given = [np.asarray(as_symbol(x), dtype=object) for x in given]
+    if "out" in options:
+        options["out"] = tuple(np.asarray(x) for x in options["out"])
+    result = getattr(ufunc, method)(*given, **options)
+    return result.view(Symbols) if isinstance(result, np.ndarray) else result
+
+
+class Symbols(np.ndarray):
+    """An array of symbols."""
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **options):
+        return _apply(inputs, ufunc, method, options)
+
+
 class Symbol:
     """The time, a component of the state, or the result of a formula."""
 
@@ -32,6 +53,9 @@ class Symbol:
 
     def __pos__(self):
         return self
+
+    def __array_ufunc__(self, ufunc, method, *inputs, **options):
+        return _apply(inputs, ufunc, method, options)
 
     __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = __abs__ = _a_kink
     __floor__ = __ceil__ = __round__ = __trunc__ = __mod__ = __rmod__ = __floordiv__ = _a_kink
@@ -89,6 +113,14 @@ class _Tape:
             return None
 
 
+    def symbol(self, given):
+        """The number as a symbol, or the symbol itself."""
+        index = self.operand(given)
+        if index is None:
+            raise TypeError(f"formula: found {given!r}, expected a number or a symbol")
+        return Symbol(self, index)
+
+
 class Formula:
     """A formula recorded from a Python function, once for each mode.
 
@@ -99,7 +131,7 @@ class Formula:
         tapes = []
         for mode in [None] if modes is None else modes:
             tape = _Tape()
-            x = np.empty(components, dtype=object)
+            x = np.empty(components, dtype=object).view(Symbols)
             for i in range(components):
                 x[i] = tape.add("component", i)
             t = tape.add("time")

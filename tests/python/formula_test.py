@@ -63,6 +63,20 @@ def test_every_operation_of_a_formula():
         np.testing.assert_allclose(run.x, expected.x, rtol=1e-9)
 
 
+def test_numbers_before_symbols_in_functions_of_two():
+    def beside(t, x):
+        numbers = np.array([2.0, 3.0])
+        return (np.arctan2(1.5, x) + np.hypot(numbers, x) / 4 + np.arctan2(x, numbers)
+                + [np.arctan2(2, x[0]) * np.float64(0.5), np.hypot(np.float32(0.5), x[1])])
+
+    expected = ricochet.integrate(ricochet.System(beside), [0.3, 0.2], 1.0, rtol=1e-12, atol=1e-12)
+    assert expected.success
+    for method in METHODS:
+        run = ricochet.integrate(ricochet.System(beside, formula=2), [0.3, 0.2], 1.0,
+                                 method=method, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(run.x, expected.x, rtol=1e-9)
+
+
 def test_modes_arguments_and_times_of_formulas():
     # From 2 down to 1 in log 2 / decay, and up again in log(3 / 2) / growth.
     def flow(mode, t, x, decay, growth):
