@@ -51,6 +51,8 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
     except ImportError:
         raise ImportError("ricochet.plot needs matplotlib, which was not found") from None
     run = getattr(run, "run", None) or run
+    if getattr(run, "times", None) is None:
+        raise ValueError("plot: found a result over no time, expected one over a span of time")
     if run.times.size == 0:
         raise ValueError("plot: found a run without states, expected one with sample_times or "
                          "record_steps=True")
@@ -58,7 +60,11 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
     ax = pyplot.gca() if ax is None else ax
     marks = run.events if events else run.events[:0]
     components = range(x.shape[1]) if components is None else components
-    labels = [f"x[{c}]" for c in components] if labels is None else labels
+    components = list(components)
+    labels = [f"x[{c}]" for c in components] if labels is None else list(labels)
+    if phase is None and len(labels) != len(components):
+        raise ValueError(f"labels: found {len(labels)}, expected one for each of "
+                         f"{len(components)} components")
     if phase is not None:
         first, second = phase
         line, = ax.plot(x[:, first], x[:, second])

@@ -381,6 +381,10 @@ def test_pictures(tmp_path):
     pyplot.close("all")
     with pytest.raises(ValueError, match="without states"):
         ricochet.plot(ricochet.integrate(Ball(), [1.0, 0.0], 2.0))
+    with pytest.raises(ValueError, match="labels: found 1, expected one for each of 2"):
+        ricochet.plot(run, labels=["height"])
+    with pytest.raises(ValueError, match="a result over no time"):
+        ricochet.plot(ricochet.solve_ivp(lambda t, y: -y, (0, 0), [1.0]))
 
 
 # --- compiled functions ---
