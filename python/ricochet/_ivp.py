@@ -324,7 +324,8 @@ def _guards(events, t0, start, args):
                 first = event(t0, y.copy(), *args)
             except Exception:  # raised again, and passed on, by the run
                 first = None
-            specification["boolean"] = isinstance(first, (bool, np.bool_))
+            specification["boolean"] = isinstance(first, (bool, np.bool_)) or (
+                isinstance(first, np.ndarray) and first.dtype == bool)
         out.append(specification)
     return out, True
 

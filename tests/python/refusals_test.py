@@ -283,6 +283,43 @@ def test_events_that_return_arrays_of_one_and_truths():
     assert result.t_events[2] == pytest.approx([0.75])
 
 
+def wave(t, x):
+    return [math.cos(t)]
+
+
+@pytest.mark.parametrize("truth", [
+    lambda t, y: y > 0.5, lambda t, y: y[:1] > 0.5, lambda t, y: np.array(y[0] > 0.5),
+    lambda t, y: y[0] > 0.5, lambda t, y: bool(y[0] > 0.5)])
+def test_arrays_of_one_truth_are_truths(truth):
+    # The wave sin(t) goes through a half at pi / 6 and 5 pi / 6, and again a period later.
+    expected = math.pi * np.array([1 / 6, 5 / 6, 13 / 6, 17 / 6])
+    found = ricochet.solve_ivp(wave, (0, 10), [0.0], events=truth, rtol=1e-9, atol=1e-9,
+                               max_step=0.5)
+    np.testing.assert_allclose(found.t_events[0], expected, atol=1e-6)
+    guard = ricochet.Guard(truth, direction=0)
+    run = ricochet.integrate(ricochet.System(wave, [guard]), [0.0], 10.0, h_max=0.5)
+    np.testing.assert_allclose(run.events["t"], expected, atol=1e-6)
+
+
+@pytest.mark.parametrize("values, boolean", [
+    (lambda t, x: [x[0] > 0.5, x[0] - 2], False), (lambda t, x: (bool(x[0] > 0.5), -1.0), False),
+    (lambda t, x: np.array([x[0] > 0.5, x[0] > 2]), False),
+    (lambda t, x: np.array([x[0] > 0.5, -1.0]), True),
+    (lambda t, x: [int(x[0] > 0.5), -1.0], True)])
+def test_truths_among_the_values_of_all_guards(values, boolean):
+    guards = [ricochet.Guard(direction=0, boolean=boolean), ricochet.Guard(direction=0)]
+    system = ricochet.System(wave, guards, guard_values=values)
+    run = ricochet.integrate(system, [0.0], 10.0, h_max=0.5)
+    np.testing.assert_allclose(run.events["t"], math.pi * np.array([1 / 6, 5 / 6, 13 / 6, 17 / 6]),
+                               atol=1e-6)
+
+
+def test_a_boolean_guard_may_be_zero_where_it_is_false():
+    guard = ricochet.Guard(lambda t, x: 1.0 * (x[0] > 0.5), direction=0, boolean=True)
+    run = ricochet.integrate(ricochet.System(wave, [guard]), [0.0], 10.0, h_max=0.5)
+    assert len(run.events) == 4
+
+
 @pytest.mark.parametrize("arguments, words", [
     ({"stop_after": 2**32 + 1}, "stop_after: found 4294967297, .* at most 4294967295"),
     ({"stop_after": math.nan}, "stop_after: found nan"), ({"stop_after": "3"}, "found '3'"),

@@ -211,7 +211,15 @@ private:
             raise(PyExc_ValueError, "guard_values returned " + std::to_string(numbers.size()) +
                                         " numbers for " + std::to_string(g.size()) + " guards");
         }
-        numbers.copy(g.data());
+        numbers.copy_guards(g.data());
+        for (std::size_t i = 0; i < g.size(); ++i) g[i] = by_its_sign(i, g[i]);
+    }
+
+    /// A zero of a guard of which only the sign has a meaning is false, as in an array that holds
+    /// truths and numbers.
+    [[nodiscard]] double by_its_sign(std::size_t which, double g) const
+    {
+        return g == 0 && source_.guards_[which].info.boolean ? -1 : g;
     }
 
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x)
@@ -223,10 +231,10 @@ private:
         }
         const CallbackGuard& guard = source_.guards_[which];
         if (guard.value.address) {
-            return reinterpret_cast<CompiledGuard>(guard.value.address)(mode, t, x.data(), x.size(),
-                                                                        guard.value.user);
+            return by_its_sign(which, reinterpret_cast<CompiledGuard>(guard.value.address)(
+                                          mode, t, x.data(), x.size(), guard.value.user));
         }
-        return number(guard.value, "", guard.title, mode, t, x);
+        return by_its_sign(which, number(guard.value, "", guard.title, mode, t, x));
     }
 
     [[nodiscard]] double number(const Function& function, const char* what, const std::string& of,

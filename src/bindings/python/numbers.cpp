@@ -3,6 +3,7 @@
 
 #include <numpy/arrayobject.h>
 
+#include <algorithm>
 #include <cstring>
 #include <utility>
 
@@ -15,6 +16,14 @@ void require_numpy()
 {
     static const bool found = [] { return _import_array() >= 0; }();
     if (!found) throw PythonError();
+}
+
+/// Whether `result` is an array of one truth, such as `x > 0` of a state with one component.
+bool is_one_truth(PyObject* result)
+{
+    if (!PyArray_Check(result)) return false;
+    auto* array = reinterpret_cast<PyArrayObject*>(result);
+    return PyArray_TYPE(array) == NPY_BOOL && PyArray_SIZE(array) == 1;
 }
 
 }  // namespace
@@ -35,7 +44,8 @@ double as_guard(PyObject* result, const std::string& who)
     require_numpy();
     if (PyFloat_Check(result)) return PyFloat_AS_DOUBLE(result);
     if (PyBool_Check(result)) return result == Py_True ? 1 : -1;
-    if (PyArray_IsScalar(result, Bool)) return PyObject_IsTrue(result) ? 1 : -1;
+    const bool is_truth = PyArray_IsScalar(result, Bool) || is_one_truth(result);
+    if (is_truth) return PyObject_IsTrue(result) ? 1 : -1;
     if (!PyComplex_Check(result) && !PyArray_IsScalar(result, ComplexFloating) &&
         result != Py_None) {
         const double number = PyFloat_AsDouble(result);
@@ -80,6 +90,22 @@ void Numbers::copy(double* out) const
     }
 }
 
+void Numbers::copy_guards(double* out) const
+{
+    copy(out);
+    if (are_truths_) {
+        std::replace(out, out + size_, 0.0, -1.0);
+    } else if (PyList_Check(result_) || PyTuple_Check(result_)) {
+        PyObject** items = PySequence_Fast_ITEMS(result_);
+        const auto count = static_cast<std::size_t>(PySequence_Fast_GET_SIZE(result_));
+        for (std::size_t i = 0; i < std::min(size_, count); ++i) {
+            const bool is_truth = PyBool_Check(items[i]) || PyArray_IsScalar(items[i], Bool) ||
+                                  is_one_truth(items[i]);
+            if (is_truth && out[i] == 0) out[i] = -1;
+        }
+    }
+}
+
 void Numbers::refuse(const std::string& found) const
 {
     raise(PyExc_TypeError,
@@ -110,6 +136,7 @@ void Numbers::read_array()
                                     " dimensions, expected 1");
     }
     if (type == NPY_OBJECT) return read_objects(array);
+    are_truths_ = type == NPY_BOOL;
     if (type != NPY_DOUBLE || !PyArray_ISCARRAY_RO(given)) {
         array = Ref::take(PyArray_FromAny(array.get(), PyArray_DescrFromType(NPY_DOUBLE), 0, 1,
                                           NPY_ARRAY_CARRAY_RO | NPY_ARRAY_FORCECAST, nullptr));

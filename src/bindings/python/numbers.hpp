@@ -30,6 +30,9 @@ public:
 
     void copy(double* out) const;
 
+    /// Copies them as values of guards: true counts as 1, false as -1.
+    void copy_guards(double* out) const;
+
 private:
     [[noreturn]] void refuse(const std::string& found) const;
     void read_array();
@@ -42,6 +45,7 @@ private:
     PyObject** items_ = nullptr;
     const double* data_ = nullptr;
     std::size_t size_ = 0;
+    bool are_truths_ = false;  ///< an array of truths
     Ref kept_;
 };
 
