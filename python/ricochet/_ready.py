@@ -3,6 +3,11 @@
 from . import _ricochet
 
 
+#: Functions of a `System`, which a ready system has in C++.
+_OF_SYSTEMS = ("flow", "guard", "reset", "rest", "guard_rate", "guards", "guard_values",
+               "reset_set", "time_events", "next_time_event", "previous_time_event", "time_reset")
+
+
 class Ready:
     """A ready system; its parameters are keyword arguments and attributes."""
 
@@ -21,11 +26,24 @@ class Ready:
         """The parameters by name."""
         return dict(self._parameters)
 
+    def __init_subclass__(cls, **options):
+        super().__init_subclass__(**options)
+        for name in _OF_SYSTEMS:
+            if name in vars(cls):
+                raise TypeError(f"{cls.__name__}: found {name!r} in a subclass of a ready system, "
+                                "which is computed without Python; expected a subclass of System")
+
     def __getattr__(self, name):
         try:
             return self.__dict__["_parameters"][name]
         except KeyError:
             raise AttributeError(f"{type(self).__name__} has no {name!r}") from None
+
+    def __setattr__(self, name, value):
+        if name in self.__dict__.get("_parameters", ()):
+            raise AttributeError(f"{name}: found an assignment to a parameter of a ready system, "
+                                 f"expected another system: {type(self).__name__}({name}=...)")
+        super().__setattr__(name, value)
 
     def _known(self, what, *arguments):
         return _ricochet.closed_form(self._source, what, [float(a) for a in arguments])

@@ -1,6 +1,7 @@
 """Hybrid systems, as classes or from functions."""
 
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterator
 from math import inf
 from numbers import Real
 from types import MethodType
@@ -11,6 +12,14 @@ from ._formula import Formula
 
 #: The largest number of events after which a guard can end the run.
 MOST_EVENTS = 2**32 - 1
+
+
+#: What a guard is told by arguments, and what events of `solve_ivp` are told by attributes.
+_OF_GUARDS = {name: name for name in (
+    "value", "direction", "reset", "rest", "rate", "enabled", "in_modes", "unilateral", "boolean",
+    "degree", "touch", "stop_after", "speed_bound", "acceleration_bound", "lower_bound",
+    "upper_bound", "lipschitz", "resets")}
+_OF_GUARDS["terminal"] = "stop_after"
 
 
 class Guard:
@@ -57,6 +66,8 @@ class Guard:
                  enabled=None, in_modes=None, unilateral=False, boolean=False, degree=0,
                  touch=0.0, stop_after=0, speed_bound=None, acceleration_bound=None,
                  lower_bound=None, upper_bound=None, lipschitz=1.0, resets=True):
+        if isinstance(in_modes, Iterator):  # read for every run
+            in_modes = list(in_modes)
         self._functions = dict(value=value, rate=rate, reset=reset, rest=rest, enabled=enabled,
                                speed_bound=speed_bound, acceleration_bound=acceleration_bound,
                                lower_bound=lower_bound, upper_bound=upper_bound)
@@ -64,6 +75,12 @@ class Guard:
                              boolean=boolean, degree=degree, touch=touch, stop_after=stop_after,
                              lipschitz=lipschitz, resets=resets)
         self.name = name
+
+    def __setattr__(self, name, value):
+        if name in _OF_GUARDS:
+            raise AttributeError(f"{name}: found an assignment to a Guard, expected an argument: "
+                                 f"Guard(..., {_OF_GUARDS[name]}=...)")
+        super().__setattr__(name, value)
 
     def __set_name__(self, owner, name):
         if self.name is None:
@@ -146,6 +163,15 @@ _KNOWN = ("flow", "guard", "reset", "rest", "guard_rate", "unilateral", "directi
           "previous_time_event", "time_reset", "changes_dimension", "parameters", "formula")
 
 
+def _plain_guard(function, index):
+    """The guard of a function, which must not say more of itself, as an event of solve_ivp does."""
+    for name in ("terminal", *_OF_GUARDS):
+        if name != "value" and name in getattr(function, "__dict__", ()):
+            raise TypeError(f"guards[{index}]: found a function with an attribute {name!r}, "
+                            f"expected Guard(function, {_OF_GUARDS[name]}=...)")
+    return Guard(function)
+
+
 def _times(given):
     try:
         times = sorted(float(t) for t in given)
@@ -203,6 +229,7 @@ class System:
     changes_dimension = False
     parameters = None
     formula = None
+    _unchecked_names = False
 
     def __init__(self, flow=None, guards=None, **members):
         if flow is not None:
@@ -217,6 +244,7 @@ class System:
 
     def __init_subclass__(cls, unchecked_names=False, **options):
         super().__init_subclass__(**options)
+        cls._unchecked_names = unchecked_names
         if unchecked_names:
             return
         for name, member in vars(cls).items():
@@ -231,15 +259,42 @@ class System:
                                     "class ...(System, unchecked_names=True)")
 
     def _mode_list(self):
-        modes = self.modes
+        modes = self._read_again("modes")
         if modes is None:
             return None
         if isinstance(modes, int):
             return list(range(modes))
         return list(modes)
 
+    def _read_again(self, name):
+        """A member that every run reads; an iterator, which could be read only once, is replaced."""
+        value = getattr(self, name)
+        if isinstance(value, Iterator):
+            value = list(value)
+            holder = self if name in vars(self) else next(
+                cls for cls in type(self).__mro__ if name in vars(cls))
+            setattr(holder, name, value)
+        return value
+
+    def _refuse_unused(self, guards, found):
+        """Rejects guards and resets that no run would use."""
+        who = type(self).__name__
+        for name, member in vars(self).items():
+            if name in found:
+                raise TypeError(f"{who}: found an attribute {name!r} of an instance in place of a "
+                                "guard of its class, expected another class")
+            if isinstance(member, Guard) and not any(member is guard for guard in guards):
+                raise TypeError(f"{who}: found the guard {name!r} as an attribute of an instance, "
+                                "expected it in the class or in guards")
+        if getattr(self, "guard", None) is None and not self._unchecked_names:
+            for name in ("reset", "rest", "guard_rate"):
+                if getattr(self, name, None) is not None:
+                    raise TypeError(f"{who}: found {name!r} without a method guard, expected that "
+                                    "of a Guard")
+
     def _guard_list(self):
         out = []
+        guards = self._read_again("guards")
         if getattr(self, "guard", None) is not None:
             single = Guard(self.guard, name="guard", reset=getattr(self, "reset", None),
                            rest=getattr(self, "rest", None),
@@ -252,11 +307,15 @@ class System:
             for name, member in vars(cls).items():
                 if isinstance(member, Guard):
                     found[name] = member
+                elif name in found:
+                    raise TypeError(f"{cls.__name__}: found {name!r} in place of a guard of a base "
+                                    "class, expected a guard: @ricochet.guard")
+        self._refuse_unused(guards, found)
         for member in found.values():
             out.append(member._specification(len(out), self))
-        for member in self.guards:
+        for member in guards:
             if not isinstance(member, Guard):
-                member = Guard(member)
+                member = _plain_guard(member, len(out))
             out.append(member._specification(len(out)))
         return out
 
@@ -288,7 +347,7 @@ class System:
             raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
         following, preceding = self.next_time_event, self.previous_time_event
         if self.time_events is not None:
-            times = _times(self.time_events)
+            times = _times(self._read_again("time_events"))
             if following is None:
                 def following(t, *_):
                     k = bisect_right(times, t)
@@ -297,6 +356,8 @@ class System:
                 def preceding(t, *_):
                     k = bisect_left(times, t)
                     return times[k - 1] if k > 0 else -inf
+        if preceding is not None and following is None:
+            raise ValueError("previous_time_event: found one without next_time_event, expected both")
         if self.time_reset is not None and following is None:
             raise ValueError("time_reset: found one without time events, expected time_events or "
                              "next_time_event beside it")

@@ -320,6 +320,117 @@ def test_a_boolean_guard_may_be_zero_where_it_is_false():
     assert len(run.events) == 4
 
 
+def test_generators_are_read_once_for_all_runs():
+    class Class(ricochet.System):
+        time_events = (t for t in [0.25, 0.75])
+
+        def flow(self, t, x):
+            return [1.0]
+
+    rising = {"direction": 1}
+    systems = (
+        ricochet.System(lambda t, x: [1.0], (ricochet.Guard(g, **rising) for g in [
+            lambda t, x: x[0] - 0.5, lambda t, x: x[0] - 0.25])),
+        ricochet.System(lambda t, x: [1.0], time_events=iter([0.25, 0.5])),
+        ricochet.System(lambda mode, t, x: [1.0], modes=iter("ab"), time_events=iter([0.25]),
+                        guards=[ricochet.Guard(lambda mode, t, x: x[0] - 0.5, in_modes=iter("a"),
+                                               **rising)]),
+        Class())
+    for system in systems:
+        for _ in range(3):
+            assert len(ricochet.integrate(system, [0.0], 1.0).events) == 2
+    assert len(ricochet.integrate(Class(), [0.0], 1.0).events) == 2
+
+
+def test_what_a_ready_system_would_not_use():
+    ball = ricochet.BouncingBall()
+    with pytest.raises(AttributeError, match="restitution: found an assignment"):
+        ball.restitution = 0.5
+    assert ball.restitution == 0.9
+    ball.note = "mine"
+    with pytest.raises(TypeError, match="Own: found 'reset' in a subclass of a ready system"):
+        class Own(ricochet.BouncingBall):
+            def reset(self, t, x):
+                return [0.0, 0.0]
+
+
+def test_what_a_guard_would_not_use():
+    guard = ricochet.Guard(lambda t, x: x[0] - 0.5)
+    for name, argument in (("direction", "direction"), ("terminal", "stop_after"),
+                           ("reset", "reset")):
+        with pytest.raises(AttributeError, match=rf"Guard\(..., {argument}=...\)"):
+            setattr(guard, name, 1)
+
+    def event(t, x):
+        return x[0] - 0.5
+
+    event.weight = 3  # of no concern
+    system = ricochet.System(decay, [event])
+    assert len(ricochet.integrate(system, [1.0], 1.0).events) == 1
+    event.terminal = True
+    with pytest.raises(TypeError, match=r"guards\[0\]: found a function with an attribute "
+                                        r"'terminal', expected Guard\(function, stop_after"):
+        ricochet.integrate(system, [1.0], 1.0)
+
+
+class Floored(ricochet.System):
+    def flow(self, t, x):
+        return [-1.0]
+
+    @ricochet.guard
+    def floor(self, t, x):
+        return x[0]
+
+
+def test_what_a_system_would_not_use():
+    class Replaced(Floored):
+        def floor(self, t, x):
+            return x[0] - 0.5
+
+    class Raised(Floored):
+        @ricochet.guard
+        def floor(self, t, x):
+            return x[0] - 0.5
+
+    class Own(Floored):
+        def __init__(self):
+            self.ceiling = ricochet.Guard(lambda t, x: x[0] - 0.25)
+
+    class Listed(Floored):
+        def __init__(self):
+            self.ceiling = ricochet.Guard(lambda t, x: x[0] - 0.25)
+            self.guards = [self.ceiling]
+
+    class Resetting(Floored):
+        def reset(self, t, x):
+            return [1.0]
+
+    def events(system, t_end=2.0, **options):
+        return ricochet.integrate(system, [1.0], t_end, **options).events["t"].tolist()
+
+    assert events(Floored()) == pytest.approx([1.0])
+    assert events(Raised()) == pytest.approx([0.5])
+    assert events(Listed()) == pytest.approx([0.75, 1.0])
+    for system, words in ((Replaced(), "'floor' in place of a guard of a base class"),
+                          (Own(), "the guard 'ceiling' as an attribute of an instance"),
+                          (Resetting(), "'reset' without a method guard")):
+        with pytest.raises(TypeError, match=words):
+            events(system)
+    changed = Floored()
+    changed.floor = lambda t, x: x[0] - 0.5
+    with pytest.raises(TypeError, match="'floor' of an instance in place of a guard"):
+        events(changed)
+    back = ricochet.System(decay, previous_time_event=lambda t: 0.5 if t > 0.5 else None)
+    with pytest.raises(ValueError, match="previous_time_event: found one without next_time_event"):
+        events(back, 0.0, t_start=1.0)
+
+
+def test_a_mode_of_a_system_without_modes():
+    for system, x0 in ((ricochet.System(decay), [1.0]), (ricochet.BouncingBall(), [1.0, 0.0])):
+        with pytest.raises(ValueError, match="mode must be 0, the only one of the system, got 3"):
+            ricochet.integrate(system, x0, 1.0, mode=3)
+
+
 @pytest.mark.parametrize("arguments, words", [
     ({"stop_after": 2**32 + 1}, "stop_after: found 4294967297, .* at most 4294967295"),
     ({"stop_after": math.nan}, "stop_after: found nan"), ({"stop_after": "3"}, "found '3'"),
