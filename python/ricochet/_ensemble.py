@@ -5,7 +5,7 @@ import numpy as np
 from . import _ricochet
 from ._network import set_gate
 from ._ready import Ready
-from ._run import numbers_from, set_mode, set_tolerance
+from ._run import number_from, numbers_from, set_mode, set_tolerance
 
 _COUNTS = ("events", "steps", "rejected", "flow_calls", "guard_calls")
 _BLOCK = 256  # number of rows submitted to an executor at a time
@@ -201,7 +201,7 @@ def ensemble(system, table, t_end, *, columns=None, x0=None, threads=None, execu
     if executor is not None and not callable(getattr(executor, "submit", None)):
         raise TypeError(f"executor: found a {type(executor).__name__}, expected one with submit()")
     parameters, starts = _tables(system, _columns_of(table, columns), x0)
-    options["t_end"] = float(t_end)
+    options["t_end"] = number_from(t_end, "t_end")
     if mode is not None:
         options["mode"] = mode
         set_mode(options, system, None)

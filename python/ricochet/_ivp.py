@@ -9,7 +9,7 @@ from . import _ricochet
 from ._compiled import Compiled
 from ._network import set_gate
 from ._ready import Ready
-from ._run import Kind, numbers_from, set_mode, set_tolerance, source_of, state_from
+from ._run import Kind, number_from, numbers_from, set_mode, set_tolerance, source_of, state_from
 from ._system import MOST_EVENTS, Guard, System
 
 _METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78", "Taylor": "taylor"}
@@ -146,7 +146,7 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     if method not in _METHODS:
         raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853'")
     try:
-        t0, t1 = map(float, t_span)
+        t0, t1 = (number_from(t, "t_span") for t in t_span)
     except (TypeError, ValueError):
         raise ValueError(f"t_span: found {t_span!r}, expected two numbers") from None
     start = state_from(y0, "y0")
@@ -220,7 +220,8 @@ _ARGUMENTS = ("method", "t_eval", "dense_output", "events", "vectorized", "args"
 
 
 def _is_number(given):
-    return isinstance(given, (int, float, np.number)) and not isinstance(given, bool)
+    return (isinstance(given, (int, float, np.integer, np.floating))
+            and not isinstance(given, (bool, np.timedelta64)))
 
 
 def _options(options, t0, t1, components):

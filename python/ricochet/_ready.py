@@ -1,6 +1,7 @@
 """Ready systems: the library's own, which run at the speed of C++."""
 
 from . import _ricochet
+from ._numbers import number_from
 
 
 #: Functions of a `System`, which a ready system has in C++.
@@ -16,7 +17,7 @@ class Ready:
     state = ()  #: the names of its components
 
     def __init__(self, **parameters):
-        self._parameters = {name: float(value) for name, value in parameters.items()}
+        self._parameters = {name: number_from(value, name) for name, value in parameters.items()}
         self._source = _ricochet.ready_system(self._name, list(self._parameters.values()))
         self._source.parameters = {name.replace("_", "-"): value
                                    for name, value in self._parameters.items()}

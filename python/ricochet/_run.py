@@ -6,6 +6,7 @@ import numpy as np
 
 from . import _ricochet
 from ._network import set_gate
+from ._numbers import number_from, numbers_from, state_from
 from ._ready import Ready
 from ._system import System
 
@@ -21,32 +22,6 @@ class Kind(IntEnum):
     STICK = 5
     SLIP = 6
     JUMP = 7          #: the guard changed sign without a zero
-
-
-def state_from(given, what):
-    """A start as a list of numbers."""
-    if type(given) in (list, tuple) and given and all(type(x) in (float, int) for x in given):
-        return list(given)
-    array = np.asarray(given)
-    if np.iscomplexobj(array):
-        raise ValueError(f"{what}: found complex numbers, expected real ones: write real and "
-                         "imaginary parts as components")
-    if array.ndim != 1:
-        raise ValueError(f"{what}: found {array.ndim} dimensions, expected 1")
-    if array.size == 0:
-        raise ValueError(f"{what}: found no components, expected at least one")
-    try:
-        return array.astype(float).tolist()
-    except (TypeError, ValueError):
-        raise TypeError(f"{what}: found {given!r}, expected numbers") from None
-
-
-def numbers_from(given, what):
-    """An array of floats."""
-    try:
-        return np.asarray(given, dtype=float)
-    except (TypeError, ValueError):
-        raise TypeError(f"{what}: found {given!r}, expected numbers") from None
 
 
 def set_tolerance(options, atol, components):
@@ -93,14 +68,14 @@ def prepare(system, x0, t_end, options, args=None):
     """The arguments of the C++ functions."""
     source, modes = source_of(system, args)
     x0 = state_from(x0, "x0")
-    options = dict(options, t_end=float(t_end))
+    options = dict(options, t_end=number_from(t_end, "t_end"))
     set_mode(options, system, modes)
     set_gate(options)
     if not isinstance(options.get("atol", 0), (float, int)):
         set_tolerance(options, options["atol"], len(x0))
     samples = options.get("sample_times")
     if samples is not None:
-        options["sample_times"] = np.asarray(samples, dtype=float).ravel().tolist()
+        options["sample_times"] = numbers_from(samples, "sample_times").ravel().tolist()
     else:
         options.pop("sample_times", None)
     if options.pop("record_steps", False):

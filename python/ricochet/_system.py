@@ -9,6 +9,7 @@ from types import MethodType
 from . import _ricochet
 from ._compiled import Compiled
 from ._formula import Formula
+from ._numbers import number_from
 
 #: The largest number of events after which a guard can end the run.
 MOST_EVENTS = 2**32 - 1
@@ -174,8 +175,8 @@ def _plain_guard(function, index):
 
 def _times(given):
     try:
-        times = sorted(float(t) for t in given)
-    except (TypeError, ValueError):
+        times = sorted(number_from(t, "time_events") for t in given)
+    except TypeError:
         raise TypeError(f"time_events: found {given!r}, expected a sequence of times") from None
     if any(t != t for t in times):
         raise ValueError("time_events: found nan, expected times")

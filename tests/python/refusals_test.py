@@ -431,6 +431,40 @@ def test_a_mode_of_a_system_without_modes():
             ricochet.integrate(system, x0, 1.0, mode=3)
 
 
+COMPLEX = np.complex128(0.5 + 1j)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("call", [
+    lambda: ricochet.solve_ivp(decay, (0, COMPLEX), [1.0]),
+    lambda: ricochet.solve_ivp(decay, np.array([0, COMPLEX]), [1.0]),
+    lambda: ricochet.solve_ivp(decay, (0, 1), [1.0], t_eval=np.array([0, COMPLEX])),
+    lambda: ricochet.solve_ivp(decay, (0, 1), [1.0], t_eval=[0, 0.5 + 1j]),
+    lambda: ricochet.solve_ivp(decay, (0, 1), [1.0], rtol=COMPLEX),
+    lambda: ricochet.solve_ivp(decay, (0, 1), [1.0], atol=COMPLEX),
+    lambda: ricochet.solve_ivp(decay, (0, 1), [1.0], max_step=COMPLEX),
+    lambda: ricochet.solve_ivp(decay, (0, 1), [1.0], first_step=COMPLEX),
+    lambda: ricochet.solve_ivp(decay, (0, 1), [1.0], dense_output=True).sol(np.array([COMPLEX])),
+    lambda: ricochet.integrate(ricochet.System(decay), [1.0], COMPLEX),
+    lambda: ricochet.integrate(ricochet.System(decay), [1.0], 1.0, sample_times=[COMPLEX]),
+    lambda: ricochet.integrate(ricochet.System(decay), [1.0], 1.0, event_tolerance=COMPLEX),
+    lambda: ricochet.integrate(ricochet.System(decay, time_events=[COMPLEX]), [1.0], 1.0),
+    lambda: ricochet.BouncingBall(restitution=COMPLEX),
+    lambda: ricochet.ensemble(ricochet.BouncingBall, {"height": np.array([COMPLEX])}, 1.0)])
+def test_complex_numbers_keep_their_imaginary_parts(call):
+    with pytest.raises((TypeError, ValueError), match="found .*(0.5|complex)"):
+        call()
+
+
+@pytest.mark.parametrize("given", [10**400, [1.0, 10**400], np.array([10**400], dtype=object)])
+def test_integers_above_all_floats(given):
+    y0 = [given] if isinstance(given, int) else given
+    with pytest.raises(ValueError, match="y0: found an integer above all floats"):
+        ricochet.solve_ivp(decay, (0, 1), y0)
+    with pytest.raises(ValueError, match="t_span: found"):
+        ricochet.solve_ivp(decay, (0, 10**400), [1.0])
+
+
 @pytest.mark.parametrize("arguments, words", [
     ({"stop_after": 2**32 + 1}, "stop_after: found 4294967297, .* at most 4294967295"),
     ({"stop_after": math.nan}, "stop_after: found nan"), ({"stop_after": "3"}, "found '3'"),

@@ -137,6 +137,10 @@ Request request_from(const py::dict& given)
             }
             throw py::type_error("found an option '" + name + "', expected some of " + known);
         }
+        if (PyComplex_Check(value.ptr())) {  // NumPy's, too, whose imaginary part would be lost
+            throw py::type_error(name + ": found " + py::cast<std::string>(py::repr(value)) +
+                                 ", expected no complex number");
+        }
         try {
             setter->second(request, value);
         } catch (const py::cast_error&) {

@@ -174,6 +174,9 @@ py::array PySolution::at(const py::object& t, bool before) const
         if (std::isnan(time)) throw py::value_error("t: found nan, expected numbers");
         return before ? solution->before(time) : (*solution)(time);
     };
+    if (py::isinstance<py::array>(t) && py::array(t).dtype().kind() == 'c') {
+        throw py::type_error("t: found complex numbers, expected real ones");
+    }
     const py::array_t<double, py::array::c_style | py::array::forcecast> times(t);
     if (times.ndim() == 0) {
         const State x = evaluate(*times.data());

@@ -1,0 +1,52 @@
+"""Numbers that a caller has given, as floats."""
+
+import numpy as np
+
+
+def state_from(given, what):
+    """A start as a list of numbers."""
+    if type(given) in (list, tuple) and given and all(type(x) in (float, int) for x in given):
+        components = given
+    else:
+        array = np.asarray(given)
+        if np.iscomplexobj(array):
+            raise ValueError(f"{what}: found complex numbers, expected real ones: write real and "
+                             "imaginary parts as components")
+        if array.dtype.kind in "mM":
+            raise TypeError(f"{what}: found times of NumPy, expected numbers")
+        if array.ndim != 1:
+            raise ValueError(f"{what}: found {array.ndim} dimensions, expected 1")
+        if array.size == 0:
+            raise ValueError(f"{what}: found no components, expected at least one")
+        components = array.tolist()
+    try:
+        return [float(x) for x in components]
+    except (TypeError, ValueError):
+        raise TypeError(f"{what}: found {given!r}, expected numbers") from None
+    except OverflowError:
+        raise ValueError(f"{what}: found an integer above all floats, expected finite "
+                         "numbers") from None
+
+
+def numbers_from(given, what):
+    """An array of floats."""
+    try:
+        array = np.asarray(given)
+        # NumPy would drop imaginary parts with a warning, and count the days of dates.
+        if array.dtype.kind in "cmM":
+            raise TypeError
+        return array.astype(float, copy=False)
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"{what}: found {given!r}, expected numbers") from None
+
+
+def number_from(given, what):
+    """A float."""
+    if type(given) is float:
+        return given
+    try:
+        if np.asarray(given).dtype.kind in "cmM":
+            raise TypeError
+        return float(given)
+    except (TypeError, ValueError, OverflowError):
+        raise TypeError(f"{what}: found {given!r}, expected a number") from None
