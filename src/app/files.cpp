@@ -47,7 +47,12 @@ fs::path behind_links(const fs::path& file)
         target = target.parent_path() / fs::read_symlink(target, error);
     }
     const fs::path directory = fs::weakly_canonical(target.parent_path(), error);
-    return error ? file : directory / target.filename();
+    if (error) return file;
+    const fs::path found = directory / target.filename();
+    // The link of a descriptor, such as /dev/stdout, to a pipe names no file.
+    const bool is_pipe = !fs::exists(found, error) && fs::exists(file, error) &&
+                         !fs::is_regular_file(file, error);
+    return is_pipe ? file : found;
 }
 
 mode_t creation_mask()
@@ -143,11 +148,25 @@ bool same_file(const fs::path& a, const fs::path& b)
     return a == b || fs::equivalent(a, b, error);
 }
 
+/// Whether the report is printed to this file, which would take its place.
+bool is_standard_output(const fs::path& file)
+{
+    struct stat printed = {};
+    struct stat other = {};
+    return fstat(STDOUT_FILENO, &printed) == 0 && S_ISREG(printed.st_mode) &&
+           stat(file.c_str(), &other) == 0 && printed.st_dev == other.st_dev &&
+           printed.st_ino == other.st_ino;
+}
+
 }  // namespace
 
 void Claims::add(std::string_view option, const fs::path& file, bool written)
 {
     const fs::path target = behind_links(file);
+    if (written && is_standard_output(target)) {
+        throw BadInput(fmt::format("{} and the standard output must be two files, got '{}' for both",
+                                   option, file.string()));
+    }
     for (const Claim& other : claims_) {
         if (!written && !other.written) continue;
         if (!same_file(target, other.file) || is_device(target)) continue;

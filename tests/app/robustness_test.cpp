@@ -226,6 +226,18 @@ int shell(const fs::path& directory, const std::string& command)
     return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
+TEST_F(Robust, AFileThatTakesWhatIsPrintedIsNoOutput)
+{
+    const std::string simulate = RICOCHET_APP " simulate bouncing-ball --csv ";
+    EXPECT_EQ(shell(work(), simulate + "ball.csv > ball.csv 2> trouble"), 2);
+    EXPECT_EQ(shell(work(), simulate + "/dev/stdout > ball.csv 2> trouble"), 2);
+    EXPECT_NE(content(work() / "trouble").find("--csv and the standard output must be two files"),
+              std::string::npos);
+    EXPECT_EQ(shell(work(), simulate + "/dev/stdout | cat > both"), 0);
+    EXPECT_NE(content(work() / "both").find("13 events"), std::string::npos);
+    EXPECT_NE(content(work() / "both").find("t [s],"), std::string::npos);
+}
+
 TEST_F(Robust, HelpThatCannotBePrintedIsAnError)
 {
     if (!fs::exists("/dev/full")) GTEST_SKIP() << "no /dev/full";
