@@ -80,6 +80,42 @@ struct Rkf45 {
 using Methods = testing::Types<Rk8pd, Rkf45>;
 INSTANTIATE_TYPED_TEST_SUITE_P(Gsl, InHost, Methods);
 
+/// A point at a constant speed of 1 m/s, and a guard that dips below zero for 6 ms.
+struct Passing {
+    using State = std::array<double, 1>;
+    void flow(double /*t*/, const State& /*x*/, State& dxdt) const { dxdt[0] = 1; }
+    template <class X>
+    [[nodiscard]] double guard(double /*t*/, const X& x) const
+    {
+        const double away = (x[0] - 3.7) / 1e-2;
+        return 1 - 1.1 * std::exp(-away * away);
+    }
+};
+
+TEST(Gsl, TheShortestAndTheLongestStepOfTheDriverHold)
+{
+    const Passing system;
+    const Mode mode = 0;
+    FlowOf<Passing> passing{&system, &mode};
+    GslFlow<Passing> flow{passing, 1};
+    gsl_odeiv2_system equations{&GslFlow<Passing>::call, nullptr, 1, &flow};
+    gsl_odeiv2_driver* driver =
+        gsl_odeiv2_driver_alloc_y_new(&equations, gsl_odeiv2_step_rkf45, 0.01, 1e-6, 1e-6);
+    gsl_odeiv2_driver_set_hmax(driver, 0.01);
+    hosts::Gsl host(*driver, 0, std::array{0.0});
+    EventMonitor monitor(system, Passing::State{0});
+    EXPECT_EQ(hosts::run(host, monitor, 10), Verdict::stands);
+    EXPECT_EQ(monitor.events().size(), 1u);
+    EXPECT_GE(monitor.statistics().steps, 999u);
+
+    gsl_odeiv2_driver_set_hmax(driver, 1);
+    driver->h = 1;
+    gsl_odeiv2_driver_set_hmin(driver, 0.5);
+    driver->h = 0.25;
+    EXPECT_THROW(host.step(20), std::runtime_error);
+    gsl_odeiv2_driver_free(driver);
+}
+
 TEST(Gsl, RefusesAMultistepMethod)
 {
     gsl_odeiv2_system system{nullptr, nullptr, 1, nullptr};

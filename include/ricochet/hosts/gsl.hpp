@@ -40,6 +40,9 @@ public:
     void step(double t_stop)
     {
         begin_step();
+        // The bounds of the driver, which `gsl_odeiv2_driver_apply` keeps.
+        driver_.h = std::min(driver_.h, driver_.hmax);
+        if (driver_.h < driver_.hmin) require(GSL_ENOPROG);
         require(gsl_odeiv2_evolve_apply(driver_.e, driver_.c, driver_.s, driver_.sys, &t1_, t_stop,
                                         &driver_.h, x1_.data()));
         flow(t1_, x1_, rate1_);
