@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <limits>
 #include <memory>
 
 #include "hosts/engine_cases.hpp"
@@ -66,6 +68,85 @@ private:
 };
 
 INSTANTIATE_TYPED_TEST_SUITE_P(Bullet, InEngine, BulletWorld);
+
+/// A body without weight between two walls, 4 cm apart; at 2.5 s its velocity is set.
+struct Slit {
+    using State = FallingBody::State;
+    static constexpr std::size_t guard_count = 2;
+    double start_again = std::numeric_limits<double>::infinity();  ///< [s]
+
+    void flow(double /*t*/, const State& x, State& dxdt) const
+    {
+        dxdt = {x[3], x[4], x[5], 0, 0, 0};
+    }
+    template <class X>
+    [[nodiscard]] double guard(std::size_t which, double /*t*/, const X& x) const
+    {
+        return which == 0 ? 0.02 - x[0] : x[0] + 0.02;
+    }
+    void reset(std::size_t /*which*/, double /*t*/, State& x) const { x[3] = -x[3]; }
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        return t < start_again ? start_again : std::numeric_limits<double>::infinity();
+    }
+    void time_reset(double /*t*/, State& x) const { x[3] = 0.5; }
+};
+
+/// Two bodies without weight, of which Bullet puts slow ones to sleep.
+struct SlowBodies {
+    btDefaultCollisionConfiguration configuration;
+    btCollisionDispatcher dispatcher{&configuration};
+    btDbvtBroadphase broadphase;
+    btSequentialImpulseConstraintSolver solver;
+    btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
+    btSphereShape shape{btScalar(0.1)};
+    btRigidBody body{btRigidBody::btRigidBodyConstructionInfo(1, nullptr, &shape)};
+    btRigidBody beside{btRigidBody::btRigidBodyConstructionInfo(1, nullptr, &shape)};
+
+    explicit SlowBodies(double velocity)
+    {
+        world.setGravity({0, 0, 0});
+        world.addRigidBody(&body);
+        world.addRigidBody(&beside);
+        body.setLinearVelocity({btScalar(velocity), 0, 0});
+        beside.setCenterOfMassTransform(btTransform(btQuaternion::getIdentity(), {0, 10, 0}));
+        beside.setLinearVelocity({btScalar(0.5), 0, 0});
+    }
+    SlowBodies(const SlowBodies&) = delete;
+    SlowBodies& operator=(const SlowBodies&) = delete;
+    ~SlowBodies()
+    {
+        world.removeRigidBody(&beside);
+        world.removeRigidBody(&body);
+    }
+    /// Moves to t = 4 s, through the events of `slit`; returns their number.
+    std::size_t run(const Slit& slit)
+    {
+        hosts::BulletBody host({&world, &body}, 0, 0.01);
+        EventMonitor monitor(slit, Slit::State{});
+        EXPECT_EQ(hosts::run(host, monitor, 4), Verdict::stands);
+        return monitor.events().size();
+    }
+};
+
+TEST(Bullet, ABodyFallsAsleepAfterAsLongAsWithoutEvents)
+{
+    // Bullet stops bodies that have been slower than 0.8 m/s for two seconds.
+    SlowBodies alone(1);
+    for (int i = 0; i < 400; ++i) alone.world.stepSimulation(btScalar(0.01), 0);
+    ASSERT_NEAR(alone.beside.getCenterOfMassPosition().x(), 1, 0.02);
+    SlowBodies bodies(1);
+    EXPECT_GT(bodies.run({}), 90u);
+    EXPECT_NEAR(bodies.beside.getCenterOfMassPosition().x(),
+                alone.beside.getCenterOfMassPosition().x(), 0.02);
+}
+
+TEST(Bullet, ABodyThatIsSetInMotionIsAwake)
+{
+    SlowBodies bodies(0);
+    EXPECT_GT(bodies.run({.start_again = 2.5}), 10u);
+    EXPECT_EQ(std::fabs(bodies.body.getLinearVelocity().x()), 0.5);
+}
 
 }  // namespace
 

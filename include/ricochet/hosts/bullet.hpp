@@ -33,17 +33,37 @@ struct BulletEngine {
     btDynamicsWorld* world;
     btRigidBody* body;
 
+    /// Whether a body has been put to sleep, and for how long it has been slow.
+    struct Rest {
+        int state = ACTIVE_TAG;
+        btScalar slow_for = 0;  ///< [s]
+
+        explicit Rest(const btRigidBody& of)
+            : state(of.getActivationState()), slow_for(of.getDeactivationTime())
+        {
+        }
+        void write(btRigidBody& to) const
+        {
+            // A body that a reset sets in motion is awake.
+            const bool moves = !to.getLinearVelocity().isZero() || !to.getAngularVelocity().isZero();
+            const bool wakes = moves && state == ISLAND_SLEEPING;
+            to.forceActivationState(wakes ? ACTIVE_TAG : state);
+            to.setDeactivationTime(wakes ? 0 : slow_for);
+        }
+    };
     /// Motion of another body of the world.
     struct Other {
         btRigidBody* body;
         btTransform place;
         btVector3 velocity, spin;
+        Rest rest;
     };
     /// State of the world that a repeated step starts from.
     struct Body {
-        std::array<double, 6> x{};
-        btTransform place{};
-        btVector3 spin{};
+        std::array<double, 6> x;
+        btTransform place;
+        btVector3 spin;
+        Rest rest;
         std::vector<Other> others{};
     };
     [[nodiscard]] RICOCHET_NOT_INLINED Body read() const
@@ -52,13 +72,14 @@ struct BulletEngine {
         const btVector3 velocity = body->getLinearVelocity();
         Body at{{place.x(), place.y(), place.z(), velocity.x(), velocity.y(), velocity.z()},
                 body->getWorldTransform(),
-                body->getAngularVelocity()};
+                body->getAngularVelocity(),
+                Rest(*body)};
         const auto& all = world->getCollisionObjectArray();
         for (int i = 0; i < all.size(); ++i) {
             btRigidBody* const other = btRigidBody::upcast(all[i]);
             if (!other || other == body || other->isStaticOrKinematicObject()) continue;
             at.others.push_back({other, other->getWorldTransform(), other->getLinearVelocity(),
-                                 other->getAngularVelocity()});
+                                 other->getAngularVelocity(), Rest(*other)});
         }
         return at;
     }
@@ -68,10 +89,12 @@ struct BulletEngine {
         body->setCenterOfMassTransform(at.place);
         body->setLinearVelocity({btScalar(at.x[3]), btScalar(at.x[4]), btScalar(at.x[5])});
         body->setAngularVelocity(at.spin);
+        at.rest.write(*body);
         for (const Other& other : at.others) {
             other.body->setCenterOfMassTransform(other.place);
             other.body->setLinearVelocity(other.velocity);
             other.body->setAngularVelocity(other.spin);
+            other.rest.write(*other.body);
         }
     }
     void advance(double s) const { world->stepSimulation(btScalar(s), 0); }
