@@ -1,7 +1,9 @@
 // Wrong use of the monitor by a host is reported, with a description of the right use.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
+#include <limits>
 #include <stdexcept>
 #include <string>
 
@@ -113,6 +115,19 @@ TEST(WrongUse, AnotherDimensionIsRefused)
     EXPECT_THROW((void)started.monitor.examine(other.host()), std::invalid_argument);
     expect_refusal<std::invalid_argument>(
         [&] { started.host().go_on_from(0, std::array{1.0}, true); }, "dimension");
+}
+
+TEST(WrongUse, AnEndThatAHostCannotReachIsRefused)
+{
+    Started started({10, 0});
+    (void)hosts::run(started.host(), started.monitor, 1);
+    EXPECT_EQ(started.host().t(), 1);
+    const double infinity = std::numeric_limits<double>::infinity();
+    for (const double t_end : {0.5, -1.0, infinity, std::nan("")}) {
+        expect_refusal<std::invalid_argument>(
+            [&] { (void)hosts::run(started.host(), started.monitor, t_end); }, "t_end must be");
+    }
+    EXPECT_EQ(hosts::run(started.host(), started.monitor, 1), Verdict::stands);
 }
 
 TEST(WrongUse, AFailingIntegratorIsNamed)

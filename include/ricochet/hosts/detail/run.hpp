@@ -15,6 +15,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "ricochet/monitor.hpp"
 
@@ -23,6 +25,7 @@ namespace ricochet::hosts {
 /// Moves `host` from its current time to t_end, through all events; calls `at_cut` with every cut
 /// before the host continues from it.
 /// @return `stands` at t_end, `rests` there, or `ended`; `monitor.outcome()` says why
+/// @throws std::invalid_argument if t_end is not finite, or lies before the time of the host
 template <class Host, class Monitor, class AtCut>
 Verdict run(Host& host, Monitor& monitor, double t_end, const AtCut& at_cut, Mode mode = 0)
 {
@@ -41,6 +44,10 @@ Verdict run(Host& host, Monitor& monitor, double t_end, const AtCut& at_cut, Mod
     };
     // Nearer to t_end than this a method cannot take a step.
     const double rounding = 8 * std::numeric_limits<double>::epsilon() * std::fabs(t_end);
+    if (!std::isfinite(t_end) || host.t() - t_end > rounding) {
+        throw std::invalid_argument("hosts::run: t_end must be finite, and not before the host at " +
+                                    std::to_string(host.t()) + ", got " + std::to_string(t_end));
+    }
     Verdict verdict = settled(monitor.start({host.t()}, host.x(), host.rate(), host.scale(), mode));
     while (verdict != Verdict::ended && t_end - host.t() > rounding) {
         const double stop = std::min(t_end, monitor.must_stop_at());
