@@ -35,4 +35,15 @@ std::string joined(std::span<const double> numbers, std::string_view separator)
     return join(numbers, separator);
 }
 
+std::string csv_cell(std::string_view text)
+{
+    if (text.find_first_of(",\"\n\r") == std::string_view::npos) return std::string(text);
+    std::string out = "\"";
+    for (const char c : text) {
+        if (c == '"') out += '"';
+        out += c == '\n' || c == '\r' ? ' ' : c;
+    }
+    return out + '"';
+}
+
 }  // namespace ricochet::app

@@ -13,4 +13,7 @@ namespace ricochet::app {
                                  std::string_view separator);
 [[nodiscard]] std::string joined(std::span<const double> numbers, std::string_view separator);
 
+/// A cell of a table of comma-separated values, in quotes where its text needs them.
+[[nodiscard]] std::string csv_cell(std::string_view text);
+
 }  // namespace ricochet::app

@@ -146,10 +146,24 @@ TEST_F(SceneApp, AnInterruptKeepsWhatThereIs)
         EXPECT_EQ(result.status, status) << result.err;
         const auto run = nlohmann::json::parse(result.out);
         EXPECT_EQ(run.at("outcome"), "cancelled");
-        EXPECT_EQ(run.at("incomplete"), true);
+        EXPECT_EQ(run.at("incomplete"), signal == SIGINT ? "interrupted" : "asked to terminate");
         EXPECT_FALSE(run.at("events").empty());
         EXPECT_NE(result.err.find("incomplete"), std::string::npos);
     }
+    const Result table = interrupted({"simulate", long_scene()}, SIGINT);
+    EXPECT_NE(table.out.find("\n  incomplete: interrupted\n"), std::string::npos) << table.out;
+}
+
+TEST_F(SceneApp, NamesOfBodiesAreSingleCells)
+{
+    std::ofstream(work() / "names.json") <<
+        R"({"bodies": [{"name": "a, \"b\"\nc", "disc": {"radius": 1, "mass": 1}, "at": [0, 0]}],
+            "run": {"t_end": 1}})";
+    const Result result = run({"simulate", "names.json", "--samples", "2", "--csv", "n.csv"});
+    ASSERT_EQ(result.status, 0) << result.err;
+    EXPECT_TRUE(content(work() / "n.csv").starts_with(
+        "t,body,x,y,vx,vy,asleep\n0,\"a, \"\"b\"\" c\",0,0,0,0,"))
+        << content(work() / "n.csv");
 }
 
 }  // namespace

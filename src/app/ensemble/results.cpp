@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "../files.hpp"
+#include "../joined.hpp"
 
 namespace ricochet::app {
 
@@ -72,24 +73,12 @@ void put_characters(std::string_view text, std::size_t width, std::string& out)
     }
 }
 
-/// A cell of a table of comma-separated values.
-std::string cell(std::string_view text)
-{
-    if (text.find_first_of(",\"\n\r") == std::string_view::npos) return std::string(text);
-    std::string out = "\"";
-    for (const char c : text) {
-        if (c == '"') out += '"';
-        out += c == '\n' || c == '\r' ? ' ' : c;
-    }
-    return out + '"';
-}
-
 std::string csv_header(const std::vector<Field>& fields)
 {
     std::string out;
     for (const Field& field : fields) {
         if (!out.empty()) out += ',';
-        out += cell(field.unit.empty() || field.unit == "1"
+        out += csv_cell(field.unit.empty() || field.unit == "1"
                         ? field.name
                         : fmt::format("{} [{}]", field.name, field.unit));
     }
@@ -120,7 +109,7 @@ void put_row(const std::vector<Field>& fields, RowReader& row, std::string& npy,
             case FieldKind::text: {
                 const std::string_view value = row.text();
                 put_characters(value, field.width, npy);
-                csv += cell(value);
+                csv += csv_cell(value);
                 break;
             }
         }

@@ -6,6 +6,9 @@
 #include <string>
 #include <string_view>
 
+#include "../input.hpp"
+#include "../interrupt.hpp"
+#include "../joined.hpp"
 #include "../json_text.hpp"
 #include "scene_command.hpp"
 
@@ -84,7 +87,8 @@ std::string scene_text(const SceneFile& file, const SceneRun& run)
         const SceneEvent& event = run.events[k];
         const std::string other = other_of(file.scene, event);
         fmt::format_to(to, "{:<22} {:<9} {}{}{}\n", event.t, name(event.kind),
-                       file.scene.name_of(BodyId{event.body}), other.empty() ? "" : ", ", other);
+                       printable(file.scene.name_of(BodyId{event.body})),
+                       other.empty() ? "" : ", ", printable(other));
     }
     if (run.events.size() > lines) {
         fmt::format_to(to, "and {} more; --json has all\n", run.events.size() - lines);
@@ -93,6 +97,9 @@ std::string scene_text(const SceneFile& file, const SceneRun& run)
     const SceneStatistics& s = run.statistics;
     fmt::format_to(to, "{} at t = {} s{}{}\n", ricochet::name(run.outcome), run.t,
                    run.message.empty() ? "" : ": ", run.message);
+    if (run.outcome == Outcome::cancelled) {
+        fmt::format_to(to, "  incomplete: {}\n", Interrupts::cause());
+    }
     fmt::format_to(to, "asleep      {} of {} bodies\n", asleep, run.bodies.size());
     fmt::format_to(to, "events      {}, {} contacts struck, {} collapses\n", s.events, s.impacts,
                    s.collapses);
@@ -106,7 +113,7 @@ std::string scene_json(const SceneFile& file, const SceneRun& run, bool samples)
 {
     const Scene& scene = file.scene;
     Json out{{"outcome", ricochet::name(run.outcome)}, {"message", run.message}, {"t", run.t}};
-    if (run.outcome == Outcome::cancelled) out["incomplete"] = true;
+    if (run.outcome == Outcome::cancelled) out["incomplete"] = Interrupts::cause();
     out["involved"] = Json::array();
     for (const std::uint32_t i : run.involved) out["involved"].push_back(scene.name_of(BodyId{i}));
     out["energy"] = energy(scene, run.bodies);
@@ -144,7 +151,7 @@ std::string scene_csv(const SceneFile& file, const SceneRun& run)
         for (std::uint32_t i = 0; i < run.samples[k].size(); ++i) {
             const BodyState& b = run.samples[k][i];
             fmt::format_to(to, "{},{},{},{},{},{},{}\n", run.sample_times[k],
-                           file.scene.name_of(BodyId{i}), b.at[0], b.at[1], b.velocity[0],
+                           csv_cell(file.scene.name_of(BodyId{i})), b.at[0], b.at[1], b.velocity[0],
                            b.velocity[1], static_cast<int>(b.asleep));
         }
     }
