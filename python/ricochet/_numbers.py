@@ -3,13 +3,19 @@
 import numpy as np
 
 
+def _is_complex(array):
+    """Whether an array has a complex number, also among objects."""
+    return np.iscomplexobj(array) or (
+        array.dtype == object and any(map(np.iscomplexobj, array.flat)))
+
+
 def state_from(given, what):
     """A start as a list of numbers."""
     if type(given) in (list, tuple) and given and all(type(x) in (float, int) for x in given):
         components = given
     else:
         array = np.asarray(given)
-        if np.iscomplexobj(array):
+        if _is_complex(array):
             raise ValueError(f"{what}: found complex numbers, expected real ones: write real and "
                              "imaginary parts as components")
         if array.dtype.kind in "mM":
@@ -33,7 +39,7 @@ def numbers_from(given, what):
     try:
         array = np.asarray(given)
         # NumPy would drop imaginary parts with a warning, and count the days of dates.
-        if array.dtype.kind in "cmM":
+        if array.dtype.kind in "mM" or _is_complex(array):
             raise TypeError
         return array.astype(float, copy=False)
     except (TypeError, ValueError, OverflowError):

@@ -227,7 +227,9 @@ def test_functions_that_are_none():
     (np.ones((1, 2)), ValueError), (np.ones((2, 2)), ValueError), ("ab", TypeError),
     (["a", "b"], TypeError), ([1j, 0], TypeError), (np.array([1j, 0]), TypeError),
     ([None, 1.0], TypeError), ([[1.0], 2.0], (TypeError, ValueError)), (object(), TypeError),
-    ([], ValueError)])
+    ([], ValueError), ([10**400, 1], TypeError), (np.array([10**400, 1]), TypeError),
+    (np.array([np.complex128(1j), 0], dtype=object), TypeError),
+    (np.array([np.complex64(1j), 0], dtype=object), TypeError)])
 def test_flows_that_return_something_else(result, error):
     with pytest.raises(error, match="fun returned"):
         ricochet.solve_ivp(lambda t, y: result, (0, 1), [1.0, 2.0])
@@ -450,6 +452,8 @@ COMPLEX = np.complex128(0.5 + 1j)
     lambda: ricochet.integrate(ricochet.System(decay), [1.0], 1.0, event_tolerance=COMPLEX),
     lambda: ricochet.integrate(ricochet.System(decay, time_events=[COMPLEX]), [1.0], 1.0),
     lambda: ricochet.BouncingBall(restitution=COMPLEX),
+    lambda: ricochet.solve_ivp(decay, (0, 1), np.array([COMPLEX, 1], dtype=object)),
+    lambda: ricochet.solve_ivp(decay, (0, 1), [1.0], t_eval=np.array([COMPLEX], dtype=object)),
     lambda: ricochet.ensemble(ricochet.BouncingBall, {"height": np.array([COMPLEX])}, 1.0)])
 def test_complex_numbers_keep_their_imaginary_parts(call):
     with pytest.raises((TypeError, ValueError), match="found .*(0.5|complex)"):

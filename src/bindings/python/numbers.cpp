@@ -85,7 +85,10 @@ void Numbers::copy(double* out) const
             out[i] = PyFloat_AS_DOUBLE(items_[i]);
         } else {
             out[i] = PyLong_AsDouble(items_[i]);
-            if (out[i] == -1 && PyErr_Occurred()) throw PythonError();
+            if (out[i] == -1 && PyErr_Occurred()) {
+                PyErr_Clear();
+                refuse("an integer above all floats");
+            }
         }
     }
 }
@@ -156,10 +159,13 @@ void Numbers::read_objects(const Ref& array)
     const Ref list = checked(PyArray_ToList(reinterpret_cast<PyArrayObject*>(array.get())));
     if (!PyList_Check(list.get())) refuse("a " + type_of(result_));
     for (Py_ssize_t i = 0; i < PyList_GET_SIZE(list.get()); ++i) {
-        converted_.push_back(PyFloat_AsDouble(PyList_GET_ITEM(list.get(), i)));
-        if (PyErr_Occurred()) {
+        PyObject* item = PyList_GET_ITEM(list.get(), i);
+        // NumPy's complex numbers would be converted without their imaginary parts.
+        const bool is_complex = PyComplex_Check(item) || PyArray_IsScalar(item, ComplexFloating);
+        converted_.push_back(is_complex ? 0 : PyFloat_AsDouble(item));
+        if (is_complex || PyErr_Occurred()) {
             PyErr_Clear();
-            refuse("a " + type_of(result_) + " with a " + type_of(PyList_GET_ITEM(list.get(), i)));
+            refuse("a " + type_of(result_) + " with a " + type_of(item));
         }
     }
     data_ = converted_.data();
