@@ -312,6 +312,13 @@ TEST_F(App, ScenesWithExpensiveGuardsMeetThem)
     EXPECT_GT(skimming["events"].size(), 20U);
     expect_refused({"simulate", "cavern", "--set", "segments=5"}, {"segments", "[8", "5"});
     expect_refused({"simulate", "cavern", "--set", "radius=50"}, {"does not fit"});
+    expect_refused({"simulate", "cavern", "--set", "segments=100.7"}, {"segments", "whole number"});
+    expect_refused({"simulate", "arm", "--set", "obstacles=40.5"}, {"obstacles", "whole number"});
+    expect_refused({"simulate", "eigenvalue", "--set", "table=5.5"}, {"table", "whole number"});
+    for (const char* scene : {"cavern", "zones", "eigenvalue", "arm"}) {
+        expect_refused({"simulate", scene, "--set", "seed=1.5"}, {"seed", "whole number"});
+        expect_refused({"simulate", scene, "--set", "seed=1e300"}, {"seed", "whole number"});
+    }
 }
 
 TEST_F(App, SystemsWithoutNetworksRefuseThem)

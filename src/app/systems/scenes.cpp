@@ -1,8 +1,14 @@
 // Scenes with expensive guards.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <cstdint>
 #include <string>
+#include <string_view>
 
+#include "../input.hpp"
 #include "entries.hpp"
 #include "labels.hpp"
 #include "problems/cavern.hpp"
@@ -13,6 +19,21 @@
 #include "scenes.hpp"
 
 namespace ricochet::app {
+
+namespace {
+
+/// @throws BadInput unless the value is a whole number that is exact as a double
+std::uint64_t whole(std::string_view name, double value)
+{
+    constexpr double most = 9007199254740992;  // 2^53
+    if (value != std::floor(value) || value > most) {
+        throw BadInput(
+            fmt::format("{} must be a whole number up to {}, got {}", name, most, value));
+    }
+    return static_cast<std::uint64_t>(value);
+}
+
+}  // namespace
 
 // --- arm ---
 
@@ -28,8 +49,8 @@ enum : std::size_t { obstacles, seed, reach, clearance, drive, damping, restitut
 Arm arm_of(const std::vector<double>& p)
 {
     using namespace arm;
-    return Arm(ArmScene::Parameters{.obstacles = static_cast<std::size_t>(p[obstacles]),
-                                    .seed = static_cast<std::uint64_t>(p[seed]),
+    return Arm(ArmScene::Parameters{.obstacles = whole("obstacles", p[obstacles]),
+                                    .seed = whole("seed", p[seed]),
                                     .reach = p[reach],
                                     .clearance = p[clearance],
                                     .drive = p[drive],
@@ -112,8 +133,8 @@ enum : std::size_t { segments, seed, size, radius, gravity, turn, drag, restitut
 Cavern cavern_of(const std::vector<double>& p)
 {
     using namespace cavern;
-    return Cavern({.segments = static_cast<std::size_t>(p[segments]),
-                   .seed = static_cast<std::uint64_t>(p[seed]),
+    return Cavern({.segments = whole("segments", p[segments]),
+                   .seed = whole("seed", p[seed]),
                    .size = p[size],
                    .radius = p[radius],
                    .gravity = p[gravity],
@@ -188,7 +209,7 @@ enum : std::size_t { seed, size, frequency, turn };  // the order of parameters
 
 Zones system(const std::vector<double>& p)
 {
-    return Zones({.seed = static_cast<std::uint64_t>(p[seed]),
+    return Zones({.seed = whole("seed", p[seed]),
                   .size = p[size],
                   .frequency = p[frequency],
                   .turn = p[turn]});
@@ -262,8 +283,8 @@ LeastEigenvalue eigenvalue_of(const std::vector<double>& p)
                             .amplitude = p[amplitude],
                             .frequency = p[frequency],
                             .slow = p[slow],
-                            .seed = static_cast<std::uint64_t>(p[seed]),
-                            .table = static_cast<std::size_t>(p[table])});
+                            .seed = whole("seed", p[seed]),
+                            .table = whole("table", p[table])});
 }
 
 namespace eigenvalue {
