@@ -268,7 +268,7 @@ class System:
         return list(modes)
 
     def _read_again(self, name):
-        """A member that every run reads; an iterator, which could be read only once, is replaced."""
+        """A member that every run reads. An iterator, readable only once, becomes a list."""
         value = getattr(self, name)
         if isinstance(value, Iterator):
             value = list(value)
@@ -358,7 +358,8 @@ class System:
                     k = bisect_left(times, t)
                     return times[k - 1] if k > 0 else -inf
         if preceding is not None and following is None:
-            raise ValueError("previous_time_event: found one without next_time_event, expected both")
+            raise ValueError("previous_time_event: found one without next_time_event, expected "
+                             "both")
         if self.time_reset is not None and following is None:
             raise ValueError("time_reset: found one without time events, expected time_events or "
                              "next_time_event beside it")

@@ -50,8 +50,8 @@ fs::path behind_links(const fs::path& file)
     if (error) return file;
     const fs::path found = directory / target.filename();
     // The link of a descriptor, such as /dev/stdout, to a pipe names no file.
-    const bool is_pipe = !fs::exists(found, error) && fs::exists(file, error) &&
-                         !fs::is_regular_file(file, error);
+    const bool is_pipe =
+        !fs::exists(found, error) && fs::exists(file, error) && !fs::is_regular_file(file, error);
     return is_pipe ? file : found;
 }
 
@@ -164,8 +164,9 @@ void Claims::add(std::string_view option, const fs::path& file, bool written)
 {
     const fs::path target = behind_links(file);
     if (written && is_standard_output(target)) {
-        throw BadInput(fmt::format("{} and the standard output must be two files, got '{}' for both",
-                                   option, file.string()));
+        throw BadInput(
+            fmt::format("{} and the standard output must be two files, got '{}' for both", option,
+                        file.string()));
     }
     for (const Claim& other : claims_) {
         if (!written && !other.written) continue;

@@ -161,8 +161,8 @@ TEST_F(SceneApp, NamesOfBodiesAreSingleCells)
             "run": {"t_end": 1}})";
     const Result result = run({"simulate", "names.json", "--samples", "2", "--csv", "n.csv"});
     ASSERT_EQ(result.status, 0) << result.err;
-    EXPECT_TRUE(content(work() / "n.csv").starts_with(
-        "t,body,x,y,vx,vy,asleep\n0,\"a, \"\"b\"\" c\",0,0,0,0,"))
+    EXPECT_TRUE(content(work() / "n.csv")
+                    .starts_with("t,body,x,y,vx,vy,asleep\n0,\"a, \"\"b\"\" c\",0,0,0,0,"))
         << content(work() / "n.csv");
 }
 

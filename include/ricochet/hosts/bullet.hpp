@@ -45,7 +45,8 @@ struct BulletEngine {
         void write(btRigidBody& to) const
         {
             // A body that a reset sets in motion is awake.
-            const bool moves = !to.getLinearVelocity().isZero() || !to.getAngularVelocity().isZero();
+            const bool moves =
+                !to.getLinearVelocity().isZero() || !to.getAngularVelocity().isZero();
             const bool wakes = moves && state == ISLAND_SLEEPING;
             to.forceActivationState(wakes ? ACTIVE_TAG : state);
             to.setDeactivationTime(wakes ? 0 : slow_for);

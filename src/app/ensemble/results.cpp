@@ -79,8 +79,8 @@ std::string csv_header(const std::vector<Field>& fields)
     for (const Field& field : fields) {
         if (!out.empty()) out += ',';
         out += csv_cell(field.unit.empty() || field.unit == "1"
-                        ? field.name
-                        : fmt::format("{} [{}]", field.name, field.unit));
+                            ? field.name
+                            : fmt::format("{} [{}]", field.name, field.unit));
     }
     return out + '\n';
 }

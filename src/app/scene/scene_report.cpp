@@ -87,8 +87,8 @@ std::string scene_text(const SceneFile& file, const SceneRun& run)
         const SceneEvent& event = run.events[k];
         const std::string other = other_of(file.scene, event);
         fmt::format_to(to, "{:<22} {:<9} {}{}{}\n", event.t, name(event.kind),
-                       printable(file.scene.name_of(BodyId{event.body})),
-                       other.empty() ? "" : ", ", printable(other));
+                       printable(file.scene.name_of(BodyId{event.body})), other.empty() ? "" : ", ",
+                       printable(other));
     }
     if (run.events.size() > lines) {
         fmt::format_to(to, "and {} more; --json has all\n", run.events.size() - lines);

@@ -45,8 +45,9 @@ Verdict run(Host& host, Monitor& monitor, double t_end, const AtCut& at_cut, Mod
     // Nearer to t_end than this a method cannot take a step.
     const double rounding = 8 * std::numeric_limits<double>::epsilon() * std::fabs(t_end);
     if (!std::isfinite(t_end) || host.t() - t_end > rounding) {
-        throw std::invalid_argument("hosts::run: t_end must be finite, and not before the host at " +
-                                    std::to_string(host.t()) + ", got " + std::to_string(t_end));
+        throw std::invalid_argument(
+            "hosts::run: t_end must be finite, and not before the host at " +
+            std::to_string(host.t()) + ", got " + std::to_string(t_end));
     }
     Verdict verdict = settled(monitor.start({host.t()}, host.x(), host.rate(), host.scale(), mode));
     while (verdict != Verdict::ended && t_end - host.t() > rounding) {
