@@ -288,9 +288,12 @@ class KernelOf<System, X, Rosenbrock4> {
             state.x0, [&](auto i) { room.by_time[i] = (room.flow[i] - room.rate[i]) / delta; });
     }
 
+    /// Length of a difference at x, which changes x however large it is.
     [[nodiscard]] static double reach_of(double x) noexcept
     {
-        return std::sqrt(std::numeric_limits<double>::epsilon() * std::max(1e-5, std::fabs(x)));
+        constexpr double epsilon = std::numeric_limits<double>::epsilon();
+        const double size = std::fabs(x);
+        return std::max(std::sqrt(epsilon * std::max(1e-5, size)), 4 * epsilon * size);
     }
 
     /// Computes f, df/ds and J at the start of a step, unless they are known for this very start.

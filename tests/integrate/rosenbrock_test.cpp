@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -75,6 +76,22 @@ TEST(Rosenbrock, IsOfOrderFourAlsoInTime)
     EXPECT_NEAR(observed_order(ImpactOscillator({.frequency = 3, .wall = 10}), {0.3, 0}), 4, 0.15);
     // Stiff, and driven: the order is reduced towards that of the stages.
     EXPECT_GE(observed_order(Following{}, {0, 1}), 2.5);
+}
+
+// A difference must change a component whose units in the last place are longer than the reach of
+// a short one.
+TEST(Rosenbrock, DifferencesAreTakenInComponentsOfAnySize)
+{
+    struct Decay {
+        using State = std::array<double, 2>;
+        void flow(double, const State& x, State& dxdt) const { dxdt = {-x[0], 0}; }
+    };
+    for (const double size : {1e-300, 1.0, 1e14, 1e16, 1e100, 1e300}) {
+        const auto run = integrate(Decay{}, {size, -std::numeric_limits<double>::max()},
+                                   {.t_end = 1, .rtol = 1e-8, .atol = 0}, Stiff{});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << size;
+        EXPECT_NEAR(run.x[0] / size, std::exp(-1), 1e-6) << size;
+    }
 }
 
 /// The flow of the valve for doubles alone.

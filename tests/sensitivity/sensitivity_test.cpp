@@ -13,6 +13,7 @@
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
 
+#include "ricochet/rosenbrock.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 #include "ricochet/systems/thermostat.hpp"
 #include "sensitivity_systems.hpp"
@@ -550,6 +551,17 @@ TEST(Sensitivity, OtherMethodsDetectorsAndLocatorsServeAsWell)
                                  FixedStep<Rk4>{}, Ends{}, Bisection{});
     ASSERT_EQ(s.events.size(), 3u);
     EXPECT_NEAR(s.events[2].dt[0], BallClosedForm().impact(2)[1], 1e-10);
+}
+
+TEST(Sensitivity, AnImplicitMethodServesAsWell)
+{
+    const auto s = sensitivities(BouncingBall(), {10.0, 0.0}, {.parameters = {restitution}},
+                                 {.t_end = 7, .rtol = 1e-8}, ErrorControlled<Rosenbrock4>{});
+    ASSERT_EQ(s.run.outcome, Outcome::reached_end);
+    ASSERT_EQ(s.events.size(), 3u);
+    const auto expected = BallClosedForm().impact(2);
+    EXPECT_NEAR(s.events[2].dt[0], expected[1], 1e-6);
+    EXPECT_NEAR(s.events[2].dt[2], expected[3], 1e-6);
 }
 
 TEST(Sensitivity, EventsAreLeftOutWhereTheyAreNotRecorded)
