@@ -31,6 +31,10 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
     }
     step_.restart(place_);
     next_review_ = 0;
+    // What is left of the run that this simulation was in.
+    run_.guard = run_.other_guard = no_guard;
+    run_.wrong_bound.reset();
+    watching_ = false;
     show_all();
     if (guarded_) search_.begin(step_.x0());
     if (defers_) planner_->restore(bank_);

@@ -280,6 +280,7 @@ public:
         pending_.clear();
         judged_.clear();
         steps_.clear();
+        wrong_.reset();
         for (std::size_t i = 0; i < bank.size(); ++i) {
             if (bank[i].enabled) schedule(i);
         }

@@ -241,6 +241,71 @@ TEST(Metered, EventsStayTheSameWhereEveryStepIsCheckedForAWhile)
         Shuttle{.loose = 4}, {.t_end = 50, .rtol = 1e-9, .atol = 1e-9, .h_max = 0.02});
 }
 
+/// A pendulum beside a wall, with bounds so loose that steps may as well all be checked.
+struct LooseBounds {
+    using State = X;
+    static constexpr std::string_view name = "shuttle";
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -std::sin(x[0])}; }
+    double guard(double, const X& x) const { return x[0] + 0.5; }
+    void reset(double, X& x) const { x = {-0.5, -0.95 * x[1]}; }
+    double speed_bound(double, const X& x) const { return 20 * std::fabs(x[1]); }
+    double acceleration_bound(double, const X&) const { return 20; }
+};
+
+// Snapshots of planned steps are restored where every step is checked, and the other way round.
+TEST(Metered, ASnapshotIsRestoredWhetherOrNotEveryStepIsChecked)
+{
+    const LooseBounds system;
+    const Options options{.t_end = 60, .rtol = 1e-6, .atol = 1e-6};
+    for (const std::uint64_t piece : {2U, 5U, 8U}) {
+        MeterOptions restless = counted(0, 0);
+        restless.trials = 1;
+        restless.piece = piece;
+        const Metered detector(Foreseen(horizon_gate(0.05), unchecked), restless);
+        const auto after = [&](int steps) {
+            Simulation simulation(system, X{1, 0}, options, ErrorControlled<Dopri5>{}, detector);
+            for (int k = 0; k < steps; ++k) simulation.step();
+            return simulation;
+        };
+        const auto whole = after(0).take();
+        ASSERT_EQ(whole.events.size(), 13U);
+        for (int saved = 1; saved < 60; ++saved) {
+            auto first = after(saved);
+            const Snapshot snapshot = first.save();
+            for (int steps = 0; steps < 60; steps += 3) {
+                auto second = after(steps);
+                const std::size_t own = second.run().events.size();
+                const std::size_t past = first.run().events.size();
+                second.restore(snapshot);
+                const auto run = second.take();
+                ASSERT_EQ(run.events.size() - own, 13U - past) << piece << ' ' << saved;
+                for (std::size_t k = past; k < 13; ++k) {
+                    ASSERT_EQ(run.events[own + k - past].t, whole.events[k].t);
+                    ASSERT_EQ(run.events[own + k - past].before, whole.events[k].before);
+                }
+                ASSERT_EQ(run.x, whole.x);
+            }
+        }
+    }
+}
+
+TEST(Metered, ASnapshotIsRestoredAfterAWrongBound)
+{
+    Shuttle system{.loose = 0.5};
+    using Planning = Simulation<Shuttle, X, Fixed, Planned<>>;
+    Planning simulation(system, at_centre, {.t_end = 6, .step = 0.001});
+    const Snapshot start = simulation.save();
+    simulation.run_to_end([](const Event<X>&) {});
+    ASSERT_EQ(simulation.run().outcome, Outcome::wrong_bound);
+    system.loose = 1;
+    simulation.restore(start);
+    const auto run = simulation.take();
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.guard, no_guard);
+    EXPECT_FALSE(run.wrong_bound);
+    EXPECT_EQ(run.events.size(), 3u);
+}
+
 TEST(Metered, PlanningIsLeftWhereItCostsMoreThanItSaves)
 {
     const MeterOptions options = counted(1e-7, 1e-6);
