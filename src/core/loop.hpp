@@ -325,7 +325,7 @@ private:
             mark_everything();
             accept();
             this->apply_time_event();
-            return this->settle_all();
+            return settle_and_record();
         }
         accept();
     }
@@ -430,6 +430,13 @@ private:
     /// ended.
     [[nodiscard]] bool handle_events();
 
+    /// Settles everything that happens at one instant, with the state after it in the solution.
+    void settle_and_record()
+    {
+        this->settle_all();
+        record_restart();
+    }
+
     /// Searches a step that may hold events, and handles them.
     [[gnu::noinline]] bool search(bool cleared);
 
@@ -462,8 +469,8 @@ private:
     /// Adds the present state to the solution, kept for a length of time [s], which may be zero.
     void record_place(double length);
 
-    /// Adds the state after resets at the end of the run, from where no further step starts.
-    void record_end();
+    /// Adds the state after resets to the solution, of which no step that starts there is part yet.
+    void record_restart();
 
     [[nodiscard]] bool lies_before(double t, double end) const noexcept
     {

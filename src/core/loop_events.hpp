@@ -30,7 +30,7 @@ bool Loop<X, single>::search(bool cleared)
     record_step(search_.at());
     limit_next_step(t);
     this->cut_short();
-    this->settle_all();
+    settle_and_record();
     return true;
 }
 

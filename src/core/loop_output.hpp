@@ -36,11 +36,12 @@ inline void Loop<X, single>::record_place(double length)
 }
 
 template <class X, bool single>
-inline void Loop<X, single>::record_end()
+void Loop<X, single>::record_restart()
 {
-    if (run_.solution.empty()) return;
+    if (!options_.record_steps || run_.solution.empty()) return;
+    const double t = step_.start().value;
     const bool complete =
-        same_state(run_.solution(run_.t), run_.x) && run_.solution.mode(run_.t) == run_.mode;
+        same_state(run_.solution(t), step_.x0()) && run_.solution.mode(t) == step_.mode();
     if (!complete) record_place(0);
 }
 

@@ -58,7 +58,7 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
     run_.statistics.disabled += std::exchange(search_.disabled, 0);
     if (ended_) {
         emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
-        if (options_.record_steps) record_end();
+        record_restart();
     }
     return run_;
 }
@@ -245,7 +245,7 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
     bank_[i].band = std::fabs(bank_.g0(i));
     search_.fired().clear();
     search_.fired().push_back(i);
-    this->settle_all();
+    settle_and_record();
     return true;
 }
 
@@ -265,7 +265,7 @@ inline void Loop<X, single>::hold(double remaining)
     if (time_event_due_) {
         step_.refresh();
         this->apply_time_event();
-        this->settle_all();
+        settle_and_record();
     }
 }
 

@@ -1029,6 +1029,35 @@ TEST(Events, TheSolutionEndsWithTheStateAfterTheLastReset)
     EXPECT_EQ(run.solution.time(run.solution.size()), run.t);
 }
 
+TEST(Events, TheSolutionOfARunInProgressEndsWithTheStateAfterTheLastReset)
+{
+    const auto advance = [](const auto& ball, const auto& start, double t_end) {
+        Simulation simulation(ball, start, {.t_end = t_end, .record_steps = true});
+        std::size_t events = 0;
+        while (simulation.advance()) {
+            ++events;
+            const auto& solution = simulation.run().solution;
+            EXPECT_EQ(solution(simulation.t()), simulation.x()) << simulation.t();
+            EXPECT_EQ(solution(simulation.t() + (t_end > 0 ? 1 : -1)), simulation.x());
+            EXPECT_NE(solution.before(simulation.t()), simulation.x());
+            EXPECT_EQ(solution.time(solution.size()), simulation.t());
+        }
+        const auto run = simulation.finish();
+        EXPECT_EQ(run.solution(run.t), run.x);
+        return events;
+    };
+    /// Kicked every second between its impacts.
+    struct Kicked : BouncingBall {
+        double next_time_event(double t) const { return std::floor(t) + 1; }
+        double previous_time_event(double t) const { return std::ceil(t) - 1; }
+        void time_reset(double, X& x) const { x[1] += 1; }
+    };
+    EXPECT_EQ(advance(BouncingBall{}, X{10, 0}, 7.5), 3u);
+    EXPECT_EQ(advance(BouncingBall{}, std::vector<double>{10, 0}, 7.5), 3u);
+    EXPECT_GE(advance(Kicked{}, X{10, 0}, 5.5), 6u);
+    EXPECT_GE(advance(Kicked{}, X{10, 0}, -5.5), 6u);
+}
+
 TEST(Events, TheSolutionKeepsTheStateOfAMotionAtRest)
 {
     // At rest the ball is marked by its third component; at 5 s it is thrown up again.
