@@ -91,6 +91,7 @@ private:
     void solve_without_gain(Cluster& cluster);
     [[nodiscard]] double kinetic_energy(const Cluster& cluster) const;
     [[nodiscard]] double work_of_surfaces(const Cluster& cluster) const;
+    [[nodiscard]] double size_of_works(const Cluster& cluster) const;
     bool solve_exactly(Cluster& cluster) const;
     void sweep(Cluster& cluster, double smallest, int most) const;
     bool wave(Cluster& cluster);

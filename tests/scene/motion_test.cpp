@@ -127,6 +127,26 @@ TEST(SceneMotion, APistonAddsTwiceItsVelocity)
     EXPECT_EQ(run.events[0].before[1], (Vector2{1, 0}));
 }
 
+TEST(SceneMotion, APistonIsElasticForBodiesAtRestThatTouch)
+{
+    // Before the impact their energy is zero; after it, it is the work of the piston, to rounding.
+    for (int k = 0; k < 100; ++k) {
+        const double speed = 0.5 + 0.015 * k;
+        Scene scene;
+        const MaterialId steel = scene.material({.restitution = 1, .friction = 0.5});
+        scene.wall(
+            {.normal = {0, 1}, .material = steel, .motion = ConstantVelocity{{0, speed}}});
+        for (const double x : {-0.5, 0.5}) {
+            scene.disc({.at = {x, 2}, .radius = 0.5, .mass = 1 + 0.03 * k + x, .material = steel});
+        }
+        const SceneRun run = simulate(scene, {.t_end = 3.2});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+        for (const BodyState& body : run.bodies) {
+            EXPECT_NEAR(body.velocity[1], 2 * speed, 1e-12) << k;
+        }
+    }
+}
+
 TEST(SceneMotion, ASleeperWakesWhenAWallComes)
 {
     // The wall stands at 0 until 1 s, then goes 3 m/s; the disc's edge is at 1.

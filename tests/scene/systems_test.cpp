@@ -213,6 +213,44 @@ struct Rotor {
     }
 };
 
+/// A disc of 1 kg without forces: x = (x, y, x', y').
+struct Drifter {
+    using State = std::array<double, 4>;
+    static constexpr std::size_t shape_count = 1;
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[2], x[3], 0, 0}; }
+    double shape_radius(std::size_t) const { return 0.25; }
+    SystemDisc shape(std::size_t, double, const State& x) const
+    {
+        return {{x[0], x[1]}, {x[2], x[3]}};
+    }
+    double shape_acceleration(std::size_t, double, const State&) const { return 0; }
+    void push(std::size_t, double, State& x, const Vector2& p) const
+    {
+        x[2] += p[0];
+        x[3] += p[1];
+    }
+};
+
+TEST(SceneSystems, AnElasticImpactOnADiscAtRestIsElasticWithFriction)
+{
+    // Head on, equal masses exchange their velocities and friction has nothing to do.
+    for (int k = 0; k < 100; ++k) {
+        const Vector2 way{std::cos(0.1 * k), std::sin(0.1 * k)};
+        Scene scene;
+        const MaterialId rubber = scene.material({.restitution = 1, .friction = 0.5});
+        scene.disc({.at = {2 * way[0], 2 * way[1]}, .radius = 0.25, .material = rubber});
+        scene.system(
+            {.motion = system_body(Drifter{}, Drifter::State{0, 0, way[0], way[1]}),
+             .material = rubber});
+        const SceneRun run = simulate(scene, {.t_end = 2});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+        for (std::size_t c = 0; c < 2; ++c) {
+            EXPECT_NEAR(run.bodies[0].velocity[c], way[c], 1e-9) << k;
+            EXPECT_NEAR(run.systems[0][2 + c], 0, 1e-9) << k;
+        }
+    }
+}
+
 TEST(SceneSystems, BothEndsOfARotorAreStruckTogether)
 {
     // Discs of mass 1 come down and up at 1 m/s onto the ends, which have 2 / 2 kg each: equal
