@@ -88,7 +88,7 @@ void Islands::restep(const Island& island, double s, std::span<double> x) const
 bool Islands::find_events(Island& island)
 {
     island.cut = false;
-    if (!island.events) return true;
+    if (!island.events || island.h == 0) return true;  // at the end of the run
     return follow(island, island.events->examine(Step(*this, island)));
 }
 

@@ -68,6 +68,11 @@ public:
     {
         return islands_[island].system != nullptr;
     }
+    /// Whether the current step of a system ends at t at events of its own.
+    [[nodiscard]] bool is_cut_at(std::uint32_t island, const Instant& t) const
+    {
+        return islands_[island].cut && islands_[island].end.value <= t.value;
+    }
     /// By the method's own map.
     [[nodiscard]] const std::vector<double>& state(std::uint32_t island, const Instant& t) const;
     /// Continues a system from t with its discs pushed by these impulses, as `restart` does.

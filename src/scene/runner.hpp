@@ -139,6 +139,7 @@ private:
     bool collapses(std::uint32_t slot);
     bool hops_below_rounding(std::uint32_t slot);
     void restart_island(std::uint32_t island);
+    bool let_events_happen();
     bool push_system(std::uint32_t island);
     void add_couplings();
     void settle(std::uint32_t i, std::uint32_t was);

@@ -289,9 +289,26 @@ bool Runner::hops_below_rounding(std::uint32_t slot)
     return true;
 }
 
+/// Takes systems of the cluster through their own events of this instant, before an impact: a push
+/// starts a new search for events, which finds later ones only. Returns whether there were any.
+bool Runner::let_events_happen()
+{
+    bool any = false;
+    for (const std::uint32_t i : cluster_.bodies) {
+        const Body& body = world_.bodies[i];
+        if (!body.mapped || !world_.islands->is_cut_at(body.island, now_)) continue;
+        const Instant& end = world_.islands->end(body.island);
+        if (before(now_, end)) now_ = end;
+        step_island(body.island);
+        any = true;
+    }
+    return any;
+}
+
 void Runner::impact(std::uint32_t i)
 {
     gather(i, pending_[i]);
+    if (let_events_happen()) return predict(i);
     resolve_cluster(i);
 }
 

@@ -251,6 +251,45 @@ TEST(SceneSystems, AnElasticImpactOnADiscAtRestIsElasticWithFriction)
     }
 }
 
+/// It is kicked by 1 m/s across at a time, and rebounds elastically from y = 0.
+struct EventfulDrifter : Drifter {
+    double kick_at = std::numeric_limits<double>::infinity();
+    double guard(double, const State& x) const { return x[1]; }
+    void reset(double, State& x) const { x[3] = -x[3]; }
+    double next_time_event(double t) const
+    {
+        return t < kick_at ? kick_at : std::numeric_limits<double>::infinity();
+    }
+    void time_reset(double, State& x) const { x[3] += 1; }
+};
+
+TEST(SceneSystems, EventsAtTheInstantOfAnImpactAreNotLost)
+{
+    // The impact along x and the events along y do not affect each other.
+    for (int k = 1; k <= 64; ++k) {
+        const double time = k / 16.0;
+        const auto run = [&](const Drifter::State& x0, double kick_at, double t_end) {
+            Scene scene;
+            scene.disc({.at = {time + 0.5, x0[1] + time * x0[3]}, .radius = 0.25});
+            EventfulDrifter drifter;
+            drifter.kick_at = kick_at;
+            scene.system({.motion = system_body(drifter, x0)});
+            return simulate(scene, {.t_end = t_end});
+        };
+        const double never = std::numeric_limits<double>::infinity();
+        const SceneRun kicked = run({0, 3, 1, 0}, time, time + 1);
+        const SceneRun rebounds = run({0, time, 1, -1}, never, time + 1);
+        for (const SceneRun* of : {&kicked, &rebounds}) {
+            ASSERT_EQ(of->outcome, Outcome::reached_end) << of->message;
+            EXPECT_NEAR(of->bodies[0].velocity[0], 1, 1e-9) << time;
+            EXPECT_NEAR(of->systems[0][2], 0, 1e-9) << time;
+            EXPECT_NEAR(of->systems[0][3], 1, 1e-9) << time;
+        }
+        // An impact at the end of the run.
+        EXPECT_EQ(run({0, 3, 1, 0}, never, time).outcome, Outcome::reached_end);
+    }
+}
+
 TEST(SceneSystems, BothEndsOfARotorAreStruckTogether)
 {
     // Discs of mass 1 come down and up at 1 m/s onto the ends, which have 2 / 2 kg each: equal
