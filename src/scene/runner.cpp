@@ -152,7 +152,6 @@ bool Runner::nothing_before(const Instant& t) const
 void Runner::step_island(std::uint32_t island)
 {
     Islands& islands = *world_.islands;
-    const auto id = static_cast<std::uint32_t>(world_.bodies.size()) + island;
     const Instant& end = islands.end(island);
     for (;;) {
         if (!islands.advance(island)) return fail_island(island);
@@ -165,8 +164,19 @@ void Runner::step_island(std::uint32_t island)
         if (!islands.unseen(island) || !nothing_before(end)) break;
         now_ = end;
     }
-    calendar_.set(id, before(end, t_end_) ? end : no_instant);
+    schedule(island);
     for (const std::uint32_t i : islands.members(island)) predict(i);
+}
+
+/// Puts the end of an island's step into the calendar. At the end of the run only events of a system
+/// remain to be done.
+void Runner::schedule(std::uint32_t island)
+{
+    const Islands& islands = *world_.islands;
+    const Instant& end = islands.end(island);
+    const bool goes_on = before(end, t_end_) || islands.is_cut_at(island, t_end_);
+    calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + island,
+                  goes_on ? end : no_instant);
 }
 
 void Runner::consider(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other)

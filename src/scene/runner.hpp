@@ -140,6 +140,7 @@ private:
     bool hops_below_rounding(std::uint32_t slot);
     void restart_island(std::uint32_t island);
     bool let_events_happen();
+    void schedule(std::uint32_t island);
     bool push_system(std::uint32_t island);
     void add_couplings();
     void settle(std::uint32_t i, std::uint32_t was);

@@ -531,9 +531,7 @@ void Runner::restart_island(std::uint32_t island)
 {
     if (world_.islands->is_system(island)) {
         if (!push_system(island)) return fail_island(island);
-        const Instant& end = world_.islands->end(island);
-        return calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + island,
-                             before(end, t_end_) ? end : no_instant);
+        return schedule(island);
     }
     velocities_.clear();
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
@@ -551,9 +549,7 @@ void Runner::restart_island(std::uint32_t island)
                     fmt::format("the step of the island of {} fell below what the time resolves",
                                 called(islands.members(island)[0])));
     }
-    const Instant& end = islands.end(island);
-    calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + island,
-                  before(end, t_end_) ? end : no_instant);
+    schedule(island);
 }
 
 }  // namespace ricochet::detail

@@ -290,6 +290,27 @@ TEST(SceneSystems, EventsAtTheInstantOfAnImpactAreNotLost)
     }
 }
 
+TEST(SceneSystems, EventsAtTheEndOfTheRunHappenAsInAPlainRun)
+{
+    const auto expect = [](const EventfulDrifter& drifter, const Drifter::State& x0, double t_end) {
+        Scene scene;
+        scene.system({.motion = system_body(drifter, x0)});
+        const SceneRun run = simulate(scene, {.t_end = t_end, .sample_times = {t_end}});
+        const auto plain = integrate(drifter, x0, {.t_end = t_end});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+        ASSERT_EQ(plain.x[3], 1);
+        EXPECT_EQ(run.systems[0][3], 1) << t_end;
+        EXPECT_EQ(run.bodies[0].velocity[1], 1) << t_end;
+        EXPECT_EQ(run.samples[0][0].velocity[1], 1) << t_end;
+    };
+    for (const double t_end : {0.7, 1.0, 2.0, 3.5}) {
+        EventfulDrifter kicked;
+        kicked.kick_at = t_end;
+        expect(kicked, {0, 3, 1, 0}, t_end);
+    }
+    expect({}, {0, 2, 0, -1}, 2);  // the guard is zero exactly at the end
+}
+
 TEST(SceneSystems, BothEndsOfARotorAreStruckTogether)
 {
     // Discs of mass 1 come down and up at 1 m/s onto the ends, which have 2 / 2 kg each: equal
