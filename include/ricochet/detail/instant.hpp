@@ -24,6 +24,19 @@ struct TwoSum {
     return {sum, (a - (sum - b_part)) + (b - b_part)};
 }
 
+/// a b = value + remainder, exactly but for underflow; a remainder of 0 above 1e300. By Dekker's
+/// product of halves (Numer. Math. 18 (1971) 224-242), since not every processor has fused
+/// multiply-add.
+[[nodiscard]] constexpr TwoSum two_product(double a, double b) noexcept
+{
+    constexpr double half = 0x1p27 + 1;
+    const double product = a * b;
+    const double a1 = half * a - (half * a - a), b1 = half * b - (half * b - b);
+    const double a2 = a - a1, b2 = b - b1;
+    const double rest = ((a1 * b1 - product) + (a1 * b2 + a2 * b1)) + a2 * b2;
+    return {product, rest == rest ? rest : 0};
+}
+
 /// A time [s] carried as value + remainder.
 struct Instant {
     double value = 0;

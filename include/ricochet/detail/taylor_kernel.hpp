@@ -269,8 +269,13 @@ class TaylorKernel {
         const OnLine line{guard, state, x, rate, root, room.there};
         if (!close_in(line, correction, crossing)) return false;
         const double ahead = (crossing.root - root.s) + crossing.root_remainder;
+        // A reset begins with this state: the rounding of its largest terms would be the largest
+        // error of the impacts that follow.
         for (std::size_t i = 0; i < size; ++i) {
-            state.at[i] = step.x[i] + (root.s * c[size + i] + (w[i] + ahead * rate[i]));
+            const TwoSum moved = two_product(root.s, c[size + i]);
+            const TwoSum sum = two_sum(step.x[i], moved.value);
+            state.at[i] =
+                sum.value + (sum.remainder + (moved.remainder + (w[i] + ahead * rate[i])));
         }
         return true;
     }
