@@ -126,6 +126,15 @@ void validate(const StepController& controller)
             if constexpr (requires { c.up; }) require(c.up >= 1, "up must be at least 1", c.up);
             if constexpr (std::is_same_v<C, ErrorStep>) {
                 require(c.reject_above >= 1, "reject_above must be at least 1", c.reject_above);
+                require(c.rule.smallest > 0 && c.rule.smallest < 1, "smallest must lie in (0, 1)",
+                        c.rule.smallest);
+                require(c.rule.largest > 1, "largest must be above 1", c.rule.largest);
+                require(c.rule.safety > 0 && std::isfinite(c.rule.safety),
+                        "safety must be positive and finite", c.rule.safety);
+            }
+            if constexpr (std::is_same_v<C, ClassicStep>) {
+                require(c.safety > 0 && std::isfinite(c.safety),
+                        "safety must be positive and finite", c.safety);
             }
             if constexpr (std::is_same_v<C, PrescribedSteps>) {
                 require(c.lengths && !c.lengths->empty(), "steps must be prescribed", 0);
@@ -146,6 +155,10 @@ void validate(const StepController& controller)
             if constexpr (std::is_same_v<C, PrintedPiStep>) {
                 require(c.gamma1 != 0 && c.gamma2 != 0, "gamma must not be zero",
                         std::min(std::abs(c.gamma1), std::abs(c.gamma2)));
+                const double exponents = 1 / c.gamma1 + 1 / c.gamma2 + c.kappa;
+                require(std::isfinite(exponents), "the exponents must be finite", exponents);
+                require(c.c1 > 0 && std::isfinite(c.c1), "c1 must be positive and finite", c.c1);
+                require(c.c2 > 1, "c2 must be above 1", c.c2);
             }
         },
         controller);

@@ -3,6 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <initializer_list>
+#include <limits>
+#include <stdexcept>
+#include <vector>
 
 #include "ricochet/nonsmooth/step_controllers.hpp"
 
@@ -71,6 +75,36 @@ TEST(StepControllers, ThePrintedPiRuleDoesNotControlTheError)
     EXPECT_TRUE(rule.judge(0.1, 1).accepted);
     EXPECT_FALSE(rule.judge(0.1, 1).accepted);
     EXPECT_FALSE(rule.judge(0.1, 1).accepted);
+}
+
+TEST(StepControllers, ThatCanNeitherShrinkNorGrowAStepAreRefused)
+{
+    const double nan = std::nan("");
+    const double infinity = std::numeric_limits<double>::infinity();
+    const std::vector<StepController> refused{
+        PrintedPiStep{.gamma1 = nan},
+        PrintedPiStep{.gamma2 = nan},
+        PrintedPiStep{.kappa = nan},
+        PrintedPiStep{.kappa = infinity},
+        PrintedPiStep{.c1 = nan},
+        PrintedPiStep{.c1 = infinity},
+        PrintedPiStep{.c2 = nan},
+        PrintedPiStep{.c2 = 0.5},
+        ClassicStep{.safety = nan},
+        ClassicStep{.safety = -1},
+        ErrorStep{.rule = {.safety = nan}},
+        ErrorStep{.rule = {.smallest = 0}},
+        ErrorStep{.rule = {.smallest = 1}},
+        ErrorStep{.rule = {.largest = 1}},
+        ErrorStep{.rule = {.largest = nan}},
+    };
+    for (std::size_t k = 0; k < refused.size(); ++k) {
+        EXPECT_THROW(validate(refused[k]), std::invalid_argument) << k;
+    }
+    for (const StepController& accepted :
+         std::initializer_list<StepController>{PrintedPiStep{}, ClassicStep{}, ErrorStep{}}) {
+        EXPECT_NO_THROW(validate(accepted));
+    }
 }
 
 }  // namespace
