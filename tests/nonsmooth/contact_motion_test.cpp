@@ -164,6 +164,40 @@ TEST(ContactMotion, StopsAfterSoManySteps)
     EXPECT_LT(run.t, 2);
 }
 
+/// A ball on a floor that a force lifts again and again.
+struct LiftedBall {
+    static constexpr int coordinates = 2;
+    static constexpr int contacts = 1;
+    static constexpr int tangents = 1;
+    using V = Eigen::Vector2d;
+    static void mass(const V&, Eigen::Matrix2d& m) { m.setIdentity(); }
+    static void force(double t, const V&, const V&, V& f) { f << 0, -9.81 + 30 * std::sin(7 * t); }
+    static void gaps(const V& q, Eigen::Matrix<double, 1, 1>& g) { g << q[1]; }
+    static void directions(const V&, Eigen::Matrix2d& h) { h << 0, 1, 1, 0; }
+    static double restitution(int) { return 0.3; }
+    static double friction(int) { return 0.2; }
+};
+
+TEST(ContactMotion, CountsStepsInContactAgainstTheLimitOfLaterFlights)
+{
+    const auto steps = [](const auto& run) {
+        return run.statistics.event_driven.steps + run.statistics.time_stepping.steps;
+    };
+    const LiftedBall::V q(0, 0.1);
+    const LiftedBall::V v(3, 0);
+    const HandOverOptions options{.t_end = 7, .set_valued = {.step = 1e-2}};
+    const auto whole = hand_over(LiftedBall{}, q, v, options);
+    ASSERT_EQ(whole.outcome, Outcome::reached_end);
+    ASSERT_FALSE(whole.phases.back().set_valued);
+    ASSERT_GT(whole.statistics.time_stepping.steps, 1U);
+    HandOverOptions fewer = options;
+    fewer.max_steps = steps(whole) - 1;
+    const auto run = hand_over(LiftedBall{}, q, v, fewer);
+    EXPECT_EQ(run.outcome, Outcome::step_limit);
+    EXPECT_EQ(steps(run), fewer.max_steps);
+    EXPECT_LT(run.t, 7);
+}
+
 /// A particle between two walls without friction; its mass matrix couples both coordinates.
 struct Shuttle {
     static constexpr int coordinates = 2;

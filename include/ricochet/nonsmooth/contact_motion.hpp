@@ -109,6 +109,12 @@ private:
         ended_ = true;
     }
 
+    /// In flight and in contact.
+    [[nodiscard]] std::uint64_t steps_taken() const
+    {
+        return run_.statistics.event_driven.steps + steps_.statistics().steps;
+    }
+
     // --- flight ---
 
     void follow_flight()
@@ -130,7 +136,7 @@ private:
     [[nodiscard]] Options flight_options() const
     {
         Options options = detail::event_options(options_, run_.t, run_.trajectory.t.size(),
-                                                run_.statistics.event_driven.steps);
+                                                steps_taken());
         if (!stepping_.error_controlled) options.step = options_.set_valued.step;
         return options;
     }
@@ -182,8 +188,7 @@ private:
                 end_with(stepping_outcome(outcome));
             } else if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
                 end_with(Outcome::cancelled);
-            } else if (run_.statistics.event_driven.steps + steps_.statistics().steps >=
-                       options_.max_steps) {
+            } else if (steps_taken() >= options_.max_steps) {
                 end_with(Outcome::step_limit);
             } else if (open >= patience_) {
                 in_contact_ = false;
