@@ -76,6 +76,15 @@ struct Ball1d {
     static double friction(int) { return 0; }
 };
 
+TEST(TimeStepping, RoundingOfManyStepsLeavesNoTinyLastStep)
+{
+    // The sum of 100 000 times 0.01 is 7.6e-10 less than 1000.
+    TimeStepping<Ball1d> motion({}, Ball1d::V(1.0), Ball1d::V(0.0), {.t_end = 1000, .step = 0.01});
+    EXPECT_EQ(motion.run(), Outcome::reached_end);
+    EXPECT_EQ(motion.statistics().steps, 100'000U);
+    EXPECT_EQ(motion.state().t, 1000);
+}
+
 TEST(TimeStepping, PassesTheAccumulationOfABouncingBallAndRests)
 {
     // From 1 m with e = 0.5 the impacts end at sqrt(2 / g) (1 + e) / (1 - e) = 1.3546 s.

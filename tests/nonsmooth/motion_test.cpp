@@ -581,6 +581,35 @@ TEST(MinimalSelection, OpposesMotionBalancesRestAndYieldsAtTheBound)
     EXPECT_EQ(minimal_selection(m, 0, {0, 0})[0], 0);
 }
 
+/// A mass that is held by a belt whose acceleration cos(frequency t) is given.
+struct FastBelt {
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 1;
+    using One = Eigen::Matrix<double, 1, 1>;
+    double frequency = 1;
+    static void smooth(double, const Eigen::Vector2d& w, Eigen::Vector2d& f) { f << w[1], 0; }
+    static IntervalSet reaction_set(double, const Eigen::Vector2d&) { return {-2, 2}; }
+    static void observe(Eigen::Matrix<double, 1, 2>& e) { e << 0, 1; }
+    void offset(double t, One& s) const { s[0] = std::sin(frequency * t) / frequency; }
+    void offset_rate(double t, One& rate) const { rate[0] = std::cos(frequency * t); }
+};
+
+TEST(MinimalSelection, FollowsTheDeclaredRateOfAFastSurface)
+{
+    for (const double frequency : {1.0, 1e3, 1e6}) {
+        const InclusionMatrices<FastBelt> m(FastBelt{frequency});
+        EXPECT_DOUBLE_EQ(minimal_selection(m, 0, {0, 0})[0], 1) << frequency;
+    }
+}
+
+TEST(Composite, RoundingOfManyStepsLeavesNoTinyLastStep)
+{
+    SetValuedMotion<SlidingMode> motion({}, one(1), {.t_end = 1000, .step = 0.01});
+    EXPECT_EQ(motion.run(), Outcome::reached_end);
+    EXPECT_EQ(motion.statistics().accepted, 100'000U);
+    EXPECT_EQ(motion.state().t, 1000);
+}
+
 // --- refusals, and reports of failed runs ---
 
 struct Singular : SlidingMode {

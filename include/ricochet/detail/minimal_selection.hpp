@@ -79,7 +79,11 @@ struct RICOCHET_ALIGNED SelectionStart {
         m.observed(t, w, y);
         m.offset(t, s);
         rate = m.observe() * (m.inverse_mass() * f);
-        if (m.traits().moves) {
+        if (m.traits().gives_offset_rate) {
+            Reaction declared = Reaction::Zero(m.reactions());
+            inclusion.offset_rate(t, declared);
+            rate -= declared;
+        } else if (m.traits().moves) {
             const double step = 1e-5 * std::max(1.0, std::abs(t));
             Reaction ahead, behind;
             m.offset(t + step, ahead);

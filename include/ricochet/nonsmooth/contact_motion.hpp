@@ -135,8 +135,8 @@ private:
 
     [[nodiscard]] Options flight_options() const
     {
-        Options options = detail::event_options(options_, run_.t, run_.trajectory.t.size(),
-                                                steps_taken());
+        Options options =
+            detail::event_options(options_, run_.t, run_.trajectory.t.size(), steps_taken());
         if (!stepping_.error_controlled) options.step = options_.set_valued.step;
         return options;
     }

@@ -8,7 +8,10 @@
 // with its reaction, is all that a step depends on.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -80,6 +83,16 @@ struct SetValuedStatistics {
 };
 
 namespace detail {
+
+/// Whether a step of length h [s] from t is the last: where `steps` steps have led to t, only their
+/// rounding, or a part in 1e9 of the step, would be left of the time to t_end.
+[[nodiscard]] inline bool is_last_step(double h, double t, double t_end,
+                                       std::uint64_t steps) noexcept
+{
+    const double rounding = static_cast<double>(steps) * std::numeric_limits<double>::epsilon() *
+                            std::max(std::abs(t), std::abs(t_end));
+    return t_end - t <= h * (1 + 1e-9) + std::min(rounding, 1e-3 * h);
+}
 /// @throws std::invalid_argument naming the field, unless it lies within `size` components.
 void validate_fields(const std::vector<ErrorField>& fields, Eigen::Index size);
 /// @throws std::invalid_argument if a learned controller's policy is null, or is for another
@@ -188,7 +201,6 @@ private:
         std::visit([](auto& c) { c.reset(); }, options_.controller);
         holds_length_ = std::holds_alternative<ConstantStep>(options_.controller);
         if (traits().box) step_.branches_of(now_, start_branches_);
-        remainder_ = 0;
         outcome_ = now_.t < options_.t_end ? Outcome::running : Outcome::reached_end;
     }
 
@@ -370,10 +382,7 @@ private:
             now_.t = options_.t_end;
             outcome_ = Outcome::reached_end;
         } else {
-            // The time is carried with the rounding error of its additions.
-            const double increment = (trial_.t - t) + remainder_;
-            now_.t = t + increment;
-            remainder_ = increment - (now_.t - t);
+            now_.t = trial_.t;
         }
         ++statistics_.accepted;
         if (options_.switches == Switches::located) {
@@ -447,7 +456,6 @@ private:
     Outcome outcome_ = Outcome::running;
     double h_ = 0;
     double h_min_ = 0;
-    double remainder_ = 0;
     double scaled_error_ = 0;
     bool holds_length_ = true;
     bool locates_ = true;
@@ -526,8 +534,7 @@ Outcome AnyMotion<N, M>::advance()
             return end_with(Outcome::reached_end);
         }
         double h = std::min(h_, options_.h_max);
-        // The last step takes all of the remainder if only a part in 1e9 would be left.
-        const bool last = left <= h * (1 + 1e-9);
+        const bool last = is_last_step(h, now_.t, options_.t_end, statistics_.accepted);
         if (last) h = left;
         ++statistics_.attempted;
         const StageReport report = attempt(h);

@@ -253,7 +253,7 @@ Outcome AnyTimeStepping<N>::advance()
     if (outcome_ != Outcome::running) return outcome_;
     const double left = options_.t_end - state_.t;
     double h = options_.step;
-    bool last = left <= h * (1 + 1e-9);
+    bool last = is_last_step(h, state_.t, options_.t_end, statistics_.steps);
     if (last) h = left;
     // Another length gives another problem, which may be easier.
     for (int attempt = 0; !take(h); ++attempt) {
