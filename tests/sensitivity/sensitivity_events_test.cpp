@@ -295,6 +295,72 @@ TEST(SensitivityThroughEvents, AGuardThatIsThereTwiceChangesNothing)
     EXPECT_LE((s.state - expected.leftCols<2>()).cwiseAbs().maxCoeff(), 1e-10);
 }
 
+/// A clock c; when it has run down, it is set to one and y loses two. Where y falls below its
+/// surface, or c rises above zero, y is set to five.
+struct CarriedBack {
+    using State = X2;
+    bool watches_clock = false;
+    static constexpr std::size_t guard_count = 2;
+
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        return {.crossing = which == 1 && watches_clock ? Crossing::rising : Crossing::falling};
+    }
+    template <class X>
+    void flow(double, const X&, X& dxdt) const
+    {
+        dxdt[0] = -1;
+        dxdt[1] = 1;
+    }
+    template <class X>
+    [[nodiscard]] double guard(std::size_t which, double, const X& x) const
+    {
+        return which == 0 || watches_clock ? x[0] : x[1];
+    }
+    template <class X>
+    void reset(std::size_t which, double, X& x) const
+    {
+        if (which == 0) {
+            x[0] = 1;
+            x[1] -= 2;
+        } else {
+            x[1] = 5;
+        }
+    }
+};
+
+// Where y is zero when it loses two, neighbouring motions have it above zero, and fall, or not.
+TEST(SensitivityThroughEvents, AGuardThatIsCarriedBackFromItsSurfaceEndsTheDerivatives)
+{
+    const Options options{.t_end = 1.5};
+    const auto at_zero = sensitivities(CarriedBack{}, {1.0, -1.0}, {}, options);
+    ASSERT_TRUE(at_zero.undefined_at);
+    EXPECT_EQ(at_zero.undefined_at->event, 0u);
+    EXPECT_EQ(at_zero.undefined_at->reason, Undefined::simultaneous);
+
+    const auto below = sensitivities(CarriedBack{}, {1.0, -1.01}, {}, options);
+    EXPECT_FALSE(below.undefined_at);
+    EXPECT_NEAR(below.run.x[1], -1.51, 1e-12);
+    EXPECT_NEAR(below.state(1, 1), 1, 1e-12);
+    const auto above = sensitivities(CarriedBack{}, {1.0, -0.99}, {}, options);
+    EXPECT_FALSE(above.undefined_at);
+    EXPECT_NEAR(above.run.x[1], 5.5, 1e-12);
+    EXPECT_NEAR(above.state(1, 1), 0, 1e-12);
+}
+
+// All motions leave the same surface at the same time, and are set back across it: y = 5 + t - c0.
+TEST(SensitivityThroughEvents, TheOtherSideOfASurfaceHidesNoDerivative)
+{
+    const auto s =
+        sensitivities(CarriedBack{.watches_clock = true}, {1.0, -1.0}, {}, {.t_end = 1.5});
+    EXPECT_FALSE(s.undefined_at);
+    EXPECT_NEAR(s.run.x[0], 0.5, 1e-12);
+    EXPECT_NEAR(s.state(0, 0), 1, 1e-12);
+    EXPECT_NEAR(s.run.x[1], 5.5, 1e-12);
+    EXPECT_NEAR(s.state(1, 0), -1, 1e-12);
+    EXPECT_NEAR(s.state(1, 1), 0, 1e-12);
+}
+
 /// A clock c; when it has run down, y loses `loss`, and if that makes y negative it
 /// is turned around.
 struct Cascade {

@@ -90,7 +90,8 @@ public:
           atol_(options.atol),
           component_atol_(options.component_atol),
           event_tolerance_(std::max(options.event_tolerance, options.event_window)),
-          event_rtol_(options.event_rtol)
+          event_rtol_(options.event_rtol),
+          backward_(options.t_end < options.t_start)
     {
     }
 
@@ -331,6 +332,7 @@ private:
     {
         const EventTime time = time_event(motion.t);
         if (time.undefined != Undefined::no) return time.undefined;
+        if (meets_others({no_guard}, motion, last)) return Undefined::simultaneous;
         pass(TimeReset{}, time.dt, motion);
         last = {motion.t, time.dt, true, last.flight_start};
         return Undefined::no;
@@ -341,6 +343,7 @@ private:
     {
         const std::vector<std::size_t> acting = acting_of(fired);
         if (acting.empty()) return Undefined::no;
+        if (meets_others(acting, motion, last)) return Undefined::simultaneous;
         if (acting.size() == 1 && acting[0] != no_guard) {
             const EventTime time = crossing(acting[0], motion, last);
             if (time.undefined != Undefined::no) return time.undefined;
@@ -352,7 +355,9 @@ private:
             pass(ResetSet{fired}, last.dt, motion);
             return Undefined::no;
         }
-        return pass_in_all_orders(acting, after, motion, last);
+        const Undefined undefined = pass_in_all_orders(acting, motion, last);
+        if (undefined != Undefined::no) return undefined;
+        return agree(motion.x, after, same_state) ? Undefined::no : Undefined::simultaneous;
     }
 
     /// The guards of the set that have a reset, with `no_guard` for a time event.
@@ -366,8 +371,67 @@ private:
         return acting;
     }
 
-    [[nodiscard]] Undefined pass_in_all_orders(std::vector<std::size_t> order, const X& after,
-                                               Motion<X>& motion, LastEvent& last) const
+    /// Whether guards that have not fired cross their surfaces here as well, within their blur, and
+    /// it makes a difference that some neighbouring motions meet them first.
+    [[nodiscard]] bool meets_others(std::vector<std::size_t> acting, const Motion<X>& motion,
+                                    const LastEvent& last) const
+    {
+        if constexpr (Guarded<System, X>) {
+            if (coincides(last, motion.t)) return false;
+            const std::size_t fired = acting.size();
+            std::vector<std::size_t> returning;
+            for (std::size_t i = 0; i < guard_count_of<X>(system()); ++i) {
+                if (std::find(acting.begin(), acting.end(), i) != acting.end()) continue;
+                const Slope slope = slope_at(i, motion);
+                if (!crosses_here(i, motion, slope, last)) continue;
+                (counts(i, slope.rate) ? acting : returning).push_back(i);
+            }
+            if (returning.empty() && acting.size() == fired) return false;
+            Motion<X> way = motion;
+            LastEvent event = last;
+            if (pass_in_all_orders(acting, way, event) != Undefined::no) return true;
+            return std::any_of(returning.begin(), returning.end(), [&](std::size_t i) {
+                return is_carried_back(i, motion, way, event.dt);
+            });
+        } else {
+            return false;
+        }
+    }
+
+    /// Whether a guard with a reset crosses its surface here.
+    [[nodiscard]] bool crosses_here(std::size_t which, const Motion<X>& motion, const Slope& slope,
+                                    const LastEvent& last) const
+    {
+        const GuardInfo info = guard_info_of<X>(system(), which);
+        return info.resets && !info.boolean && std::fabs(slope.guard) <= slope.blur &&
+               call_enabled_in(system(), which, motion.mode) &&
+               call_enabled_at(system(), which, motion.mode, motion.t, motion.x) &&
+               !grazes(which, motion, slope, motion.t - last.flight_start);
+    }
+
+    /// Whether an event is a crossing in the direction of this rate.
+    [[nodiscard]] bool counts(std::size_t which, double rate) const
+    {
+        const Crossing crossing = guard_info_of<X>(system(), which).crossing;
+        const bool falls = (rate < 0) != backward_;
+        return crossing == Crossing::either || falls == (crossing == Crossing::falling);
+    }
+
+    /// Whether resets from `before` to `after` carry a guard back across the surface that it has
+    /// reached, while for some neighbouring motions it has not.
+    [[nodiscard]] bool is_carried_back(std::size_t which, const Motion<X>& before,
+                                       const Motion<X>& after, const Eigen::VectorXd& dt) const
+    {
+        if (!call_enabled_in(system(), which, after.mode)) return false;
+        const Slope there = slope_at(which, after);
+        const double rate = slope_at(which, before).rate;
+        const bool back = (there.guard < 0) == ((rate > 0) != backward_);
+        return back && std::fabs(there.guard) > there.blur &&
+               !agree(moves(which, before, rate), dt, same_derivative);
+    }
+
+    [[nodiscard]] Undefined pass_in_all_orders(std::vector<std::size_t> order, Motion<X>& motion,
+                                               LastEvent& last) const
     {
         if (order.size() > most_orders) return Undefined::simultaneous;
         std::sort(order.begin(), order.end());
@@ -385,7 +449,6 @@ private:
                 return Undefined::simultaneous;
             }
         } while (std::next_permutation(order.begin(), order.end()));
-        if (!agree(first->x, after, same_state)) return Undefined::simultaneous;
         motion = *first;
         last = first_last;
         return Undefined::no;
@@ -465,6 +528,7 @@ private:
     std::vector<double> component_atol_;
     double event_tolerance_;
     double event_rtol_;
+    bool backward_;
 };
 
 }  // namespace ricochet::detail
