@@ -204,8 +204,8 @@ double Impacts::work_of_surfaces(const Cluster& cluster) const
     return work;
 }
 
-/// [J] Size of the works on systems and of surfaces in the current solve, by which their rounding is
-/// measured: the energy of the bodies that are counted may be zero before it.
+/// [J] Size of the works on systems and of surfaces in the current solve, by which their rounding
+/// is measured: the energy of the bodies that are counted may be zero before it.
 double Impacts::size_of_works(const Cluster& cluster) const
 {
     double size = 0;

@@ -168,8 +168,8 @@ void Runner::step_island(std::uint32_t island)
     for (const std::uint32_t i : islands.members(island)) predict(i);
 }
 
-/// Puts the end of an island's step into the calendar. At the end of the run only events of a system
-/// remain to be done.
+/// Puts the end of an island's step into the calendar. At the end of the run only events of a
+/// system remain to be done.
 void Runner::schedule(std::uint32_t island)
 {
     const Islands& islands = *world_.islands;

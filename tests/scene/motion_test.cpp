@@ -134,8 +134,7 @@ TEST(SceneMotion, APistonIsElasticForBodiesAtRestThatTouch)
         const double speed = 0.5 + 0.015 * k;
         Scene scene;
         const MaterialId steel = scene.material({.restitution = 1, .friction = 0.5});
-        scene.wall(
-            {.normal = {0, 1}, .material = steel, .motion = ConstantVelocity{{0, speed}}});
+        scene.wall({.normal = {0, 1}, .material = steel, .motion = ConstantVelocity{{0, speed}}});
         for (const double x : {-0.5, 0.5}) {
             scene.disc({.at = {x, 2}, .radius = 0.5, .mass = 1 + 0.03 * k + x, .material = steel});
         }

@@ -239,9 +239,8 @@ TEST(SceneSystems, AnElasticImpactOnADiscAtRestIsElasticWithFriction)
         Scene scene;
         const MaterialId rubber = scene.material({.restitution = 1, .friction = 0.5});
         scene.disc({.at = {2 * way[0], 2 * way[1]}, .radius = 0.25, .material = rubber});
-        scene.system(
-            {.motion = system_body(Drifter{}, Drifter::State{0, 0, way[0], way[1]}),
-             .material = rubber});
+        scene.system({.motion = system_body(Drifter{}, Drifter::State{0, 0, way[0], way[1]}),
+                      .material = rubber});
         const SceneRun run = simulate(scene, {.t_end = 2});
         ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
         for (std::size_t c = 0; c < 2; ++c) {
