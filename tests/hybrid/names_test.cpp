@@ -1,5 +1,5 @@
-// With all public headers but those of scenes, and `using namespace ricochet`, everyday names remain
-// the user's own.
+// With all public headers but those of scenes, and `using namespace ricochet`, everyday names
+// remain the user's own.
 
 #include <gtest/gtest.h>
 

@@ -63,7 +63,10 @@ void expect_bits_of_odeint(State x)
         if constexpr (detail::has_error_estimate<typename Ours::template Stepper<State>>) {
             const double error = ours.attempt(h, 1e-8, 1e-8);
             const double their_error = theirs.attempt(h, 1e-8, 1e-8);
-            EXPECT_TRUE(error == their_error || std::isnan(error));
+            // Where an estimate of zero is replaced, the rates are straight up to rounding: at most
+            // 0.14 ulps of h times them, over 1e-8.
+            constexpr bool replaced = Ours::template Stepper<State>::estimates_quadrature;
+            EXPECT_TRUE(error == their_error || std::isnan(error) || (replaced && error < 1e-5));
         } else {
             ours.attempt(h);
             theirs.attempt(h);
