@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "ricochet/hosts/detail/body_step.hpp"
+#include "ricochet/hosts/detail/bullet_rest.hpp"
 
 // Bullet writes vectors as floats and copies them as SSE vectors. Where writing and reading are
 // inlined into one function, g++ 12 at -O2 assumes that they concern different memory, and the
@@ -33,38 +34,19 @@ struct BulletEngine {
     btDynamicsWorld* world;
     btRigidBody* body;
 
-    /// Whether a body has been put to sleep, and for how long it has been slow.
-    struct Rest {
-        int state = ACTIVE_TAG;
-        btScalar slow_for = 0;  ///< [s]
-
-        explicit Rest(const btRigidBody& of)
-            : state(of.getActivationState()), slow_for(of.getDeactivationTime())
-        {
-        }
-        void write(btRigidBody& to) const
-        {
-            // A body that a reset sets in motion is awake.
-            const bool moves =
-                !to.getLinearVelocity().isZero() || !to.getAngularVelocity().isZero();
-            const bool wakes = moves && state == ISLAND_SLEEPING;
-            to.forceActivationState(wakes ? ACTIVE_TAG : state);
-            to.setDeactivationTime(wakes ? 0 : slow_for);
-        }
-    };
     /// Motion of another body of the world.
     struct Other {
         btRigidBody* body;
         btTransform place;
         btVector3 velocity, spin;
-        Rest rest;
+        detail::BulletRest rest;
     };
     /// State of the world that a repeated step starts from.
     struct Body {
         std::array<double, 6> x;
         btTransform place;
         btVector3 spin;
-        Rest rest;
+        detail::BulletRest rest;
         std::vector<Other> others{};
     };
     [[nodiscard]] RICOCHET_NOT_INLINED Body read() const
@@ -74,13 +56,13 @@ struct BulletEngine {
         Body at{{place.x(), place.y(), place.z(), velocity.x(), velocity.y(), velocity.z()},
                 body->getWorldTransform(),
                 body->getAngularVelocity(),
-                Rest(*body)};
+                detail::BulletRest(*body)};
         const auto& all = world->getCollisionObjectArray();
         for (int i = 0; i < all.size(); ++i) {
             btRigidBody* const other = btRigidBody::upcast(all[i]);
             if (!other || other == body || other->isStaticOrKinematicObject()) continue;
             at.others.push_back({other, other->getWorldTransform(), other->getLinearVelocity(),
-                                 other->getAngularVelocity(), Rest(*other)});
+                                 other->getAngularVelocity(), detail::BulletRest(*other)});
         }
         return at;
     }
