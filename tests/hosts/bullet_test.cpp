@@ -13,6 +13,15 @@ namespace ricochet::hosts_test::bullet_test {
 
 namespace {
 
+/// A world without bodies, and what Bullet makes one of.
+struct EmptyWorld {
+    btDefaultCollisionConfiguration configuration;
+    btCollisionDispatcher dispatcher{&configuration};
+    btDbvtBroadphase broadphase;
+    btSequentialImpulseConstraintSolver solver;
+    btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
+};
+
 /// A world with a body that falls.
 class BulletWorld {
 public:
@@ -57,11 +66,8 @@ private:
         body_.setCenterOfMassTransform(place);
     }
 
-    btDefaultCollisionConfiguration configuration_;
-    btCollisionDispatcher dispatcher_{&configuration_};
-    btDbvtBroadphase broadphase_;
-    btSequentialImpulseConstraintSolver solver_;
-    btDiscreteDynamicsWorld world_{&dispatcher_, &broadphase_, &solver_, &configuration_};
+    EmptyWorld parts_;
+    btDiscreteDynamicsWorld& world_ = parts_.world;
     btSphereShape shape_{btScalar(0.1)};
     btRigidBody body_{btRigidBody::btRigidBodyConstructionInfo(1, nullptr, &shape_, {1, 1, 1})};
     btRigidBody beside_{btRigidBody::btRigidBodyConstructionInfo(1, nullptr, &shape_, {1, 1, 1})};
@@ -93,12 +99,7 @@ struct Slit {
 };
 
 /// Two bodies without weight, of which Bullet puts slow ones to sleep.
-struct SlowBodies {
-    btDefaultCollisionConfiguration configuration;
-    btCollisionDispatcher dispatcher{&configuration};
-    btDbvtBroadphase broadphase;
-    btSequentialImpulseConstraintSolver solver;
-    btDiscreteDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
+struct SlowBodies : EmptyWorld {
     btSphereShape shape{btScalar(0.1)};
     btRigidBody body{btRigidBody::btRigidBodyConstructionInfo(1, nullptr, &shape)};
     btRigidBody beside{btRigidBody::btRigidBodyConstructionInfo(1, nullptr, &shape)};

@@ -18,9 +18,10 @@ void require_numpy()
     if (!found) throw PythonError();
 }
 
-/// Whether `result` is an array of one truth, such as `x > 0` of a state with one component.
-bool is_one_truth(PyObject* result)
+/// Whether `result` is a truth, or an array of one, such as `x > 0` of a state with one component.
+bool is_truth(PyObject* result)
 {
+    if (PyBool_Check(result) || PyArray_IsScalar(result, Bool)) return true;
     if (!PyArray_Check(result)) return false;
     auto* array = reinterpret_cast<PyArrayObject*>(result);
     return PyArray_TYPE(array) == NPY_BOOL && PyArray_SIZE(array) == 1;
@@ -43,9 +44,7 @@ double as_guard(PyObject* result, const std::string& who)
 {
     require_numpy();
     if (PyFloat_Check(result)) return PyFloat_AS_DOUBLE(result);
-    if (PyBool_Check(result)) return result == Py_True ? 1 : -1;
-    const bool is_truth = PyArray_IsScalar(result, Bool) || is_one_truth(result);
-    if (is_truth) return PyObject_IsTrue(result) ? 1 : -1;
+    if (is_truth(result)) return PyObject_IsTrue(result) ? 1 : -1;
     if (!PyComplex_Check(result) && !PyArray_IsScalar(result, ComplexFloating) &&
         result != Py_None) {
         const double number = PyFloat_AsDouble(result);
@@ -102,9 +101,7 @@ void Numbers::copy_guards(double* out) const
         PyObject** items = PySequence_Fast_ITEMS(result_);
         const auto count = static_cast<std::size_t>(PySequence_Fast_GET_SIZE(result_));
         for (std::size_t i = 0; i < std::min(size_, count); ++i) {
-            const bool is_truth = PyBool_Check(items[i]) || PyArray_IsScalar(items[i], Bool) ||
-                                  is_one_truth(items[i]);
-            if (is_truth && out[i] == 0) out[i] = -1;
+            if (out[i] == 0 && is_truth(items[i])) out[i] = -1;
         }
     }
 }
