@@ -78,7 +78,7 @@ public:
                    const Visit& visit) const
     {
         const Cells& own = bodies[i].big ? big_cells_ : cells_;
-        own.around(cell, [&](std::uint32_t bucket) { own.each_in(bucket, bodies, visit); });
+        own.each_around(cell, bodies, visit);
         if (rings_.empty()) return;
         if (!bodies[i].big) return rings_.each_on(bodies[i].bucket, visit);
         rings_.each_bucket(cells_, ring_of_[i],

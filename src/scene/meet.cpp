@@ -111,19 +111,15 @@ Path World::path(std::uint32_t i, const Instant& t) const
     return path;
 }
 
-Vector2 World::position(std::uint32_t i, const Instant& t) const
+Vector2 World::stepped_position(std::uint32_t i, const Instant& t) const
 {
-    const Body& b = bodies[i];
-    if (b.quartic) return islands->position(i, t);
-    return place(b, seconds(b.t, t));
+    return islands->position(i, t);
 }
 
-Vector2 World::velocity(std::uint32_t i, const Instant& t) const
+Vector2 World::stepped_velocity(std::uint32_t i, const Instant& t) const
 {
-    const Body& b = bodies[i];
-    if (b.quartic) return islands->velocity(i, t);
-    if (b.contact != none) return drifts[i].v + seconds(b.t, t) * drifts[i].rate;
-    return speed(b, seconds(b.t, t));
+    if (bodies[i].quartic) return islands->velocity(i, t);
+    return drifts[i].v + seconds(bodies[i].t, t) * drifts[i].rate;
 }
 
 Vector2 World::heading(std::uint32_t i, const Instant& t) const

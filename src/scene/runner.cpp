@@ -179,10 +179,9 @@ void Runner::schedule(std::uint32_t island)
                   goes_on ? end : no_instant);
 }
 
-void Runner::consider(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other)
+void Runner::keep_if_first(std::uint32_t i, const Meeting& meeting, bool surface,
+                           std::uint32_t other)
 {
-    ++world_.statistics.predictions;
-    if (!(meeting.after < never)) return;
     const Instant t = meeting.from.after(meeting.after);
     Pending& pending = pending_[i];
     using Kind = Pending::Kind;
@@ -204,14 +203,14 @@ void Runner::consider_walls(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
     if (body.contact != none) return;  // its group meets them
+    const double rounding = World::rounding(body.p, body.radius);
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) {
         const Face& wall = world_.faces[f];
         const double rate = dot(body.v, wall.normal);
         const double bend = dot(body.a, wall.normal);
         if (!body.quartic && rate >= 0 && bend >= 0) continue;
         const double gap = dot(body.p - wall.at, wall.normal) - body.radius;
-        const double rounding = World::rounding(body.p, body.radius) + World::rounding(wall.at, 0);
-        if (body.quartic || gap <= rounding) {
+        if (body.quartic || gap <= rounding + World::rounding(wall.at, 0)) {
             consider(i, meet_face(world_, i, f), true, f);
             continue;
         }

@@ -85,7 +85,12 @@ private:
     void place_all();
     void settle_at_start();
     void predict(std::uint32_t i);
-    void consider(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other);
+    void consider(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other)
+    {
+        ++world_.statistics.predictions;
+        if (meeting.after < never) keep_if_first(i, meeting, surface, other);
+    }
+    void keep_if_first(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other);
     void consider_walls(std::uint32_t i);
     void consider_body(std::uint32_t i, std::uint32_t j);
     void consider_faces(std::uint32_t i);

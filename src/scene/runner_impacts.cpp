@@ -138,10 +138,10 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         contact.friction = world_.friction(body.material, world_.faces[f].material);
         cluster_.contacts.push_back(contact);
     };
+    const double near = body.radius + 1e-6 * (body.radius + norm(p));
     const auto look = [&](std::uint32_t f) {
         const Face& face = world_.faces[f];
-        if (face.kind == Face::Kind::wall && f != sure &&
-            dot(p - face.at, face.normal) > body.radius + 1e-6 * (body.radius + norm(p))) {
+        if (face.kind == Face::Kind::wall && f != sure && dot(p - face.at, face.normal) > near) {
             return;
         }
         const bool above = face.kind == Face::Kind::segment && world_.arrives_above(body, f, p, v);

@@ -209,6 +209,8 @@ struct World {
     }
 
 private:
+    [[nodiscard]] Vector2 stepped_position(std::uint32_t i, const Instant& t) const;
+    [[nodiscard]] Vector2 stepped_velocity(std::uint32_t i, const Instant& t) const;
     void add_moving_faces();
     void put_to_sleep();
 };
@@ -221,6 +223,17 @@ private:
 [[nodiscard]] inline Vector2 speed(const Body& b, double s) noexcept
 {
     return {b.v[0] + s * b.a[0], b.v[1] + s * b.a[1]};
+}
+
+inline Vector2 World::position(std::uint32_t i, const Instant& t) const
+{
+    const Body& b = bodies[i];
+    return b.quartic ? stepped_position(i, t) : place(b, seconds(b.t, t));
+}
+inline Vector2 World::velocity(std::uint32_t i, const Instant& t) const
+{
+    const Body& b = bodies[i];
+    return b.quartic || b.contact != none ? stepped_velocity(i, t) : speed(b, seconds(b.t, t));
 }
 
 /// A first contact, `after` seconds after `from`; infinite if there is none. `presses`: the two

@@ -72,6 +72,7 @@ struct Check {
 /// Scenes: cost by dopri5, beside common steps and plain runs; labels, reversal, brute force,
 /// cradles, rest, piles.
 [[nodiscard]] Measured time_slowed_balls();
+[[nodiscard]] Measured compare_one_state();
 [[nodiscard]] Measured compare_common_steps();
 [[nodiscard]] Measured compare_plain_run();
 [[nodiscard]] Measured relabel_bodies();

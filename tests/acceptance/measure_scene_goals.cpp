@@ -46,6 +46,36 @@ struct SlowedBody {
     }
 };
 
+/// The balls of a scene in one state of `integrate`: heights, then velocities.
+struct BallsInOneState {
+    using State = std::vector<double>;
+    std::size_t count;
+    double radius = 0.25, drag = 1e-6;
+
+    [[nodiscard]] std::size_t guard_count() const { return count; }
+    void flow(double /*t*/, const State& x, State& rate) const
+    {
+        for (std::size_t i = 0; i < count; ++i) {
+            rate[i] = x[count + i];
+            rate[count + i] = -9.81 - drag * x[count + i];
+        }
+    }
+    [[nodiscard]] double guard(std::size_t i, double /*t*/, const State& x) const
+    {
+        return x[i] - radius;
+    }
+    [[nodiscard]] double guard_rate(std::size_t i, double /*t*/, const State& /*x*/,
+                                    const State& rate) const
+    {
+        return rate[i];
+    }
+    void reset(std::size_t i, double /*t*/, State& x) const
+    {
+        x[i] = radius;
+        x[count + i] = -x[count + i];
+    }
+};
+
 /// Equal dumbbells, separate or joined to one state by springs without force.
 Scene equal_dumbbells(int count, bool joined)
 {
@@ -144,6 +174,41 @@ Measured time_slowed_balls()
     const double many = each(10'000, 10);
     return {.pass = one <= 0.4e-6 && many <= 0.7e-6,
             .text = fmt::format("{:.2f} us for one, {:.2f} us at 10 000", 1e6 * one, 1e6 * many)};
+}
+
+Measured compare_one_state()
+{
+    constexpr std::size_t count = 1000;
+    constexpr double t_end = 0.8;
+    const BallsInOneState balls{count};
+    std::vector<double> start(2 * count);
+    Scene scene({.gravity = {0, -9.81}});
+    scene.wall({.normal = {0, 1}});
+    for (std::size_t i = 0; i < count; ++i) {
+        start[i] = 1.5 + 9.0 * static_cast<double>(i) / count;
+        scene.disc({.at = {1.0 * static_cast<double>(i), start[i]},
+                    .radius = balls.radius,
+                    .drag = balls.drag});
+    }
+    SceneRun of_scene;
+    const double time = least_time([&] { of_scene = simulate(scene, {.t_end = t_end}); });
+    std::vector<double> impacts;
+    const double in_one = least_time([&] {
+        const auto run = integrate(balls, start, {.t_end = t_end, .rtol = 1e-8, .atol = 1e-10});
+        impacts.clear();
+        for (const auto& event : run.events) impacts.push_back(event.t);
+    });
+    double apart = impacts.size() == of_scene.events.size() ? 0 : 1;
+    for (std::size_t k = 0; apart < 1 && k < impacts.size(); ++k) {
+        apart = std::max(apart, std::fabs(impacts[k] - of_scene.events[k].t));
+    }
+    const double each = 1e6 / static_cast<double>(impacts.size());
+    return {
+        .pass = in_one >= 1000 * time && apart <= 1e-8,
+        .text = fmt::format("{:.0f} times", in_one / time),
+        .details = {fmt::format("{} impacts, {:.2f} us each in the scene, {:.0f} us each in one "
+                                "state, {:.1e} s apart",
+                                impacts.size(), time * each, in_one * each, apart)}};
 }
 
 Measured compare_common_steps()
