@@ -191,6 +191,22 @@ public:
         return undefined;
     }
 
+    /// Whether the last event has put a guard on its surface that it then leaves, while some
+    /// neighbouring motions are put before the surface, and cross it.
+    [[nodiscard]] bool leaves_surface(const Motion<X>& after, const LastEvent& last) const
+    {
+        if constexpr (Guarded<System, X>) {
+            for (std::size_t i = 0; i < guard_count_of<X>(system()); ++i) {
+                const Slope slope = slope_at(i, after);
+                if (crosses_here(i, after, slope, last) && counts(i, slope.rate) &&
+                    !agree(moves(i, after, slope.rate), last.dt, same_derivative)) {
+                    return true;
+                }
+            }
+        }
+        return false;
+    }
+
     /// Column j as a vector like x.
     [[nodiscard]] static X column_of(const Eigen::MatrixXd& derivatives, std::size_t j, X x)
     {

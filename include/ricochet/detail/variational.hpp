@@ -146,6 +146,13 @@ public:
         return saltation_.crossing(which, motion_at(mode, t, y), last_event_of(y));
     }
 
+    /// Whether an event at t [s] after which the state is y has put a guard on its surface, and
+    /// some neighbouring motions before it.
+    [[nodiscard]] bool leaves_surface(Mode mode, double t, const State& y) const
+    {
+        return saltation_.leaves_surface(motion_at(mode, t, y), last_event_of(y));
+    }
+
     /// Derivatives of the time of a time event at t [s].
     [[nodiscard]] detail::EventTime time_event(double t) const { return saltation_.time_event(t); }
 

@@ -172,6 +172,12 @@ private:
             variational_.guard_info(event.guard).resets) {
             reason = Undefined::grazing;
         }
+        const bool is_last = k + 1 == flat_.events.size() || flat_.events[k + 1].t != event.t;
+        const bool acts = event.after != event.before || event.mode_after != event.mode_before;
+        if (reason == Undefined::no && is_last && acts &&
+            variational_.leaves_surface(event.mode_after, event.t, event.after)) {
+            reason = Undefined::simultaneous;
+        }
         if (reason != Undefined::no) result_.undefined_at = UndefinedAt{k, reason};
     }
 
