@@ -10,6 +10,7 @@
 #include <functional>
 #include <limits>
 #include <memory>
+#include <ostream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -26,6 +27,7 @@ struct Trainer {
     std::string name;
     std::function<TrainedPolicy(const Environment&, const PolicyTraining&, const PolicyCallback&)>
         train;
+    friend void PrintTo(const Trainer& trainer, std::ostream* out) { *out << trainer.name; }
 };
 
 TrainedPolicy small_tqc(const Environment& environment, const PolicyTraining& training,
