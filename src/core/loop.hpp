@@ -356,13 +356,15 @@ private:
     /// Rolls the whole interval back without a check, and continues step by step.
     void take_back()
     {
-        careful_steps_ = planner_->steps().size() + 1;
+        const std::size_t accepted = planner_->steps().size();
+        careful_steps_ = accepted + 1;
         planner_->abandon();
-        take_back_to(0);
+        take_back_to(0, accepted);
     }
 
-    /// Goes back to the start of tentative step k.
-    void take_back_to(std::size_t k);
+    /// Goes back to the start of tentative step k. The first `accepted` of them were accepted: all
+    /// but one that is still to be closed.
+    void take_back_to(std::size_t k, std::size_t accepted);
 
     [[nodiscard]] bool holds_sample() const noexcept
     {

@@ -78,7 +78,7 @@ inline void Loop<X, single>::close_interval()
     const std::size_t steps = planner_->steps().size();
     const std::size_t doubt = planner_->close(step_, bank_, run_.statistics, h_next_);
     if (planner_->wrong()) {
-        if (doubt != Planner<X, single>::none && doubt + 1 < steps) take_back_to(doubt);
+        if (doubt != Planner<X, single>::none && doubt + 1 < steps) take_back_to(doubt, steps - 1);
         return this->name_wrong_bound();
     }
     if (doubt == Planner<X, single>::none) {
@@ -87,7 +87,7 @@ inline void Loop<X, single>::close_interval()
         return pass();
     }
     this->count_deferred(doubt);
-    if (doubt + 1 < steps) return take_back_to(doubt);
+    if (doubt + 1 < steps) return take_back_to(doubt, steps - 1);
     planner_->steps().clear();
     judge();
 }
@@ -102,11 +102,10 @@ inline void Loop<X, single>::judge()
 }
 
 template <class X, bool single>
-inline void Loop<X, single>::take_back_to(std::size_t k)
+inline void Loop<X, single>::take_back_to(std::size_t k, std::size_t accepted)
 {
     const auto& tentative = planner_->steps()[k];
-    // The current step has not been accepted.
-    const std::size_t taken = planner_->steps().size() - 1 - k;
+    const std::size_t taken = accepted - k;
     ++run_.statistics.rollbacks;
     run_.statistics.repeated_steps += taken;
     run_.statistics.steps -= taken;

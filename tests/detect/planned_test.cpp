@@ -867,6 +867,35 @@ TEST(Planned, AnEventTakesFiveExactCallsToLocateOnAverage)
     EXPECT_LE(extra / static_cast<double>(run.statistics.events), 5);
 }
 
+TEST(Planned, StepsThatAreTakenBackAreNotCounted)
+{
+    // The run is cancelled by its own flow, wherever that is.
+    struct Cancelling : Room {
+        std::atomic<bool>* cancelled = nullptr;
+        mutable int calls = 0;
+        void flow(double t, const X& x, X& dxdt) const
+        {
+            if (--calls == 0) *cancelled = true;
+            Room::flow(t, x, dxdt);
+        }
+    };
+    std::uint64_t taken_back = 0;
+    for (int calls = 100; calls < 3400; calls += 31) {
+        std::atomic<bool> cancelled = false;
+        Options options{.t_end = 5, .step = 1.0 / 256};
+        options.cancelled = &cancelled;
+        Cancelling system;
+        system.cancelled = &cancelled;
+        system.calls = calls;
+        const X start{0, 0, 0.5, 1};
+        const auto run = integrate(system, start, options, Fixed{}, Planned{});
+        EXPECT_EQ(run.outcome, Outcome::cancelled);
+        EXPECT_EQ(static_cast<double>(run.statistics.steps), 256 * run.t) << calls;
+        taken_back += run.statistics.repeated_steps;
+    }
+    EXPECT_GT(taken_back, 0u);
+}
+
 TEST(Planned, RefusesPlansThatAreNone)
 {
     EXPECT_THROW(Planned({.margin = -0.1}), std::invalid_argument);
