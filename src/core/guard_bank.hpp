@@ -60,6 +60,11 @@ public:
     {
         return {step.mode(), step.time(0), step.x0(), step.rate0(), scale};
     }
+    /// As `start_of`, with the rate that the step had before it was taken.
+    [[nodiscard]] static SamplePoint<X> arrival_of(const Step<X>& step, double scale)
+    {
+        return {step.mode(), step.time(0), step.x0(), step.kept_rate(), scale};
+    }
     [[nodiscard]] static SamplePoint<X> end_of(const Step<X>& step)
     {
         return {step.mode(), step.time(step.h()), step.x1(), step.rate1(), step.h()};
@@ -90,7 +95,7 @@ public:
     void wake_all(const Step<X>& step, double scale, std::uint64_t& calls, bool sampled)
     {
         if (!sampled) sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
-        sample_rates(start_of(step, scale), calls, rate0_);
+        sample_rates(arrival_of(step, scale), calls, rate0_);
         for (std::size_t i = 0; i < size(); ++i) {
             records_[i].deferred = false;
             arm(i, records_[i].side);

@@ -50,7 +50,7 @@ template <class X, bool single>
 inline void Loop<X, single>::remember_step(double proposed, std::uint64_t rejected)
 {
     auto& tentative = planner_->steps().add();
-    step_.store(tentative.start);
+    step_.store_as_kept(tentative.start);
     tentative.h_next = proposed;
     tentative.last_h = last_h_;
     tentative.samples = next_sample_;

@@ -61,7 +61,11 @@ void Loop<X, single>::copy_to_mark()
         mark_->counts = run_.statistics;
         mark_->counts.rejected = rejected;
     }
-    step_.store(mark_->start);
+    if (defers_) {
+        step_.store_as_kept(mark_->start);
+    } else {
+        step_.store(mark_->start);
+    }
     mark_->bank = bank_;
     mark_->flight_start = flight_start_;
     mark_->longest_step = longest_step_;
@@ -89,6 +93,8 @@ void Loop<X, single>::go_back_to_mark()
         time_event_ = mark.time_event;
         resting_ = mark.resting;
         watching_ = mark.watching;
+    } else if (defers_) {
+        step_.put_back_rate();
     }
     h_next_ = mark.h_next;
     newly_armed_ = mark.newly_armed;

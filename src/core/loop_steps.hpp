@@ -73,6 +73,7 @@ inline void Loop<X, single>::advance_from_here(const Advance& how)
         if (is_tentative()) take_back();
         return end(Outcome::cancelled);
     }
+    if (defers_) step_.keep_rate();
     if (resting_) return hold(remaining);
     if (defers_) return advance_by_plan(remaining, how);
     if (!take_step(remaining)) return;

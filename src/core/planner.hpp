@@ -199,7 +199,7 @@ public:
             const double value = value_at(i, start, step.mode(), bank, counts);
             if (!(check.rate == check.rate) || check.time != start.time) {
                 check.rate = meter_.time_guard([&] {
-                    return bank.rate_of(i, Bank::start_of(step, last_h), counts.guard_calls);
+                    return bank.rate_of(i, Bank::arrival_of(step, last_h), counts.guard_calls);
                 });
             }
             const double end_value = value_at(i, end, step.mode(), bank, counts);

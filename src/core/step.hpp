@@ -38,6 +38,7 @@ public:
         : system_(system),
           kernel_(&kernel),
           state_(x),
+          kept_rate_(state_.zero),
           unused_rate_(state_.zero),
           end_slope_(state_.zero),
           inner_w_{state_.zero, state_.zero},
@@ -411,6 +412,27 @@ public:
         return {state_.start, state_.mode, state_.x0, state_.remainder, state_.rate0};
     }
 
+    /// Keeps the flow at the start of the step that is about to be taken: a method with a series
+    /// replaces it by the slope of the series, which differs in the last digits.
+    void keep_rate()
+    {
+        if (kernel_->series) assign(kept_rate_, state_.rate0);
+    }
+    [[nodiscard]] const X& kept_rate() const noexcept
+    {
+        return kernel_->series ? kept_rate_ : state_.rate0;
+    }
+    void put_back_rate()
+    {
+        if (kernel_->series) assign(state_.rate0, kept_rate_);
+    }
+    /// As `store`, with the rate that was kept.
+    void store_as_kept(StepStart<X>& at) const
+    {
+        store(at);
+        assign(at.rate, kept_rate());
+    }
+
     /// Copies the start of the step, like `place`, into memory that is already allocated.
     void store(StepStart<X>& at) const
     {
@@ -515,7 +537,7 @@ private:
         state.flow_calls = state_.flow_calls;
         state_ = std::move(state);
         place_tolerances();
-        unused_rate_ = end_slope_ = state_.zero;
+        unused_rate_ = end_slope_ = kept_rate_ = state_.zero;
         inner_w_.fill(state_.zero);
         inner_rate_.fill(state_.zero);
         if (kernel_->renew) kernel_->renew(system_.door());
@@ -588,6 +610,7 @@ private:
     mutable StepState<X> state_;
     std::vector<double> component_atol_;
     double atol_ = 0;
+    X kept_rate_;
     mutable X unused_rate_, end_slope_;
     mutable std::array<X, 2> inner_w_, inner_rate_;  ///< `middle` replaces the first
     mutable std::uint64_t resteps_ = 0;

@@ -18,6 +18,8 @@
 #include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
+#include "ricochet/rosenbrock.hpp"
+#include "ricochet/taylor.hpp"
 
 namespace ricochet::planned_test {
 namespace {
@@ -865,6 +867,55 @@ TEST(Planned, AnEventTakesFiveExactCallsToLocateOnAverage)
         static_cast<double>(checked.statistics.guard_calls - checked.statistics.steps);
     EXPECT_GT(run.statistics.events, 30u);
     EXPECT_LE(extra / static_cast<double>(run.statistics.events), 5);
+}
+
+/// A point that turns about the origin, whose guard also moves with time, for any scalar.
+struct Turning {
+    using State = X;
+    bool acts = true;
+    template <class S>
+    void flow(const S&, const std::array<S, 4>& x, std::array<S, 4>& dxdt) const
+    {
+        dxdt[0] = x[2];
+        dxdt[1] = x[3];
+        dxdt[2] = -x[0];
+        dxdt[3] = -2.0 * x[1];
+    }
+    [[nodiscard]] GuardInfo guard_info() const
+    {
+        return {.crossing = Crossing::either, .resets = acts};
+    }
+    double guard(double t, const X& x) const
+    {
+        return 0.3 + 0.2 * std::sin(3 * t) + 0.7 * x[0] - 0.5 * x[1];
+    }
+    void reset(double, X& x) const { x[3] = -0.9 * x[3]; }
+    double speed_bound(double t, const X& x) const
+    {
+        return std::fabs(0.6 * std::cos(3 * t) + 0.7 * x[2] - 0.5 * x[3]);
+    }
+    double acceleration_bound(double, const X& x) const
+    {
+        const double energy = x[2] * x[2] + x[0] * x[0] + x[3] * x[3] + 2 * x[1] * x[1];
+        return 2 + 1.8 * std::sqrt(energy);
+    }
+};
+
+TEST(Planned, MethodsThatMakeASeriesHaveTheEventsOfTheExactDetector)
+{
+    std::mt19937_64 random(41);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    std::uint64_t events = 0;
+    for (int i = 0; i < 30 && !HasFailure(); ++i) {
+        SCOPED_TRACE(i);
+        const X start{uniform(random), uniform(random), uniform(random), uniform(random)};
+        const Turning turning{i % 2 == 0};
+        const Options options{.t_end = 10, .rtol = std::pow(10, -6 + 2 * uniform(random))};
+        expect_planned_same<ErrorControlled<Taylor>>(turning, start, options);
+        const auto run = expect_planned_same<ErrorControlled<Rosenbrock4>>(turning, start, options);
+        events += run.statistics.events;
+    }
+    EXPECT_GT(events, 100u);
 }
 
 TEST(Planned, StepsThatAreTakenBackAreNotCounted)
