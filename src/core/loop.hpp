@@ -450,6 +450,10 @@ private:
     /// the polynomial alone holds no events. False: the run has ended.
     [[nodiscard]] bool smooth_step();
 
+    /// Whether the polynomial of the step, of length h, does not follow the motion inside, and the
+    /// step can be repeated with a tenth of its length.
+    [[nodiscard]] bool is_rough(double h) const;
+
     /// A length at whose end a guard may be a number again: just `beyond` a surface that lies in
     /// the step, if the crossing can be seen there, else before it.
     [[nodiscard]] double shorten_into_domain(bool beyond);

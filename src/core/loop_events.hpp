@@ -56,13 +56,20 @@ inline bool Loop<X, single>::return_to_domain()
 }
 
 template <class X, bool single>
-bool Loop<X, single>::smooth_step()
+bool Loop<X, single>::is_rough(double h) const
 {
     // Errors of the state may be as large as the tolerance, and the inside need not be better.
     constexpr double most = 4;
-    while (step_.roughness(options_.rtol, options_.atol) > most) {
+    return step_.may_be_rough() && step_.roughness(options_.rtol, options_.atol) > most &&
+           0.1 * h >= smallest_step();
+}
+
+template <class X, bool single>
+bool Loop<X, single>::smooth_step()
+{
+    while (is_rough(step_.h())) {
         const double h = 0.1 * step_.h();
-        if (is_tentative() || h < smallest_step()) return true;
+        if (is_tentative()) return true;
         ++run_.statistics.rejected;
         is_last_ = time_event_due_ = false;
         if (!take_controlled_step(h, h)) return false;

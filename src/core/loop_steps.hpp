@@ -179,7 +179,12 @@ inline bool Loop<X, single>::retry(double h, double proposed, double largest, do
 {
     const int order = step_.error_order() + 1;
     for (;;) {
-        if (rule_.accepts(error)) {
+        const bool accepts = rule_.accepts(error);
+        // The steps of a guard with bounds must not depend on whether it is examined.
+        const bool rough = accepts && system_->bounded && is_rough(h);
+        if (rough) {
+            h *= 0.1;
+        } else if (accepts) {
             const double next = h * std::min(largest, step_factor(error, order));
             const bool cut = largest > 1 && h < proposed;
             h_next_ = std::min(cut ? std::max(next, proposed) : next, options_.h_max);
@@ -187,7 +192,7 @@ inline bool Loop<X, single>::retry(double h, double proposed, double largest, do
         }
         ++run_.statistics.rejected;
         const bool finite = std::isfinite(error);
-        h = finite ? h * step_factor(error, order) : shorten_to_surface(h);
+        if (!rough) h = finite ? h * step_factor(error, order) : shorten_to_surface(h);
         is_last_ = false;
         time_event_due_ = false;
         largest = 1;

@@ -918,6 +918,53 @@ TEST(Planned, MethodsThatMakeASeriesHaveTheEventsOfTheExactDetector)
     EXPECT_GT(events, 100u);
 }
 
+/// A stiff component that is kicked away from what it follows, and slow ones with guards.
+struct Kicked {
+    using State = X;
+    static constexpr std::size_t guard_count = 3;
+    double stiffness = 1000;  ///< [1/s]
+    double period = 0.7;      ///< [s]
+
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const
+    {
+        return {.crossing = Crossing::either, .resets = false};
+    }
+    void flow(double t, const X& x, X& dxdt) const
+    {
+        dxdt = {-stiffness * (x[0] - std::cos(t)), 0.5 * x[0] - x[2], x[1], 0};
+    }
+    double guard(std::size_t which, double, const X& x) const
+    {
+        return x[1] + 0.3 * (static_cast<double>(which) - 1);
+    }
+    double next_time_event(double t) const
+    {
+        double n = std::floor(t / period);
+        while (n * period <= t) ++n;
+        return n * period;
+    }
+    void time_reset(double, X& x) const { x[0] = x[0] > 0 ? -3 : 3; }
+    double speed_bound(std::size_t, double, const X& x) const { return 2 + std::fabs(x[2]); }
+    double acceleration_bound(std::size_t, double, const X& x) const
+    {
+        return 2 + std::hypot(x[1], x[2]);
+    }
+};
+
+TEST(Planned, StepsWithARoughPolynomialAreThoseOfTheExactDetector)
+{
+    for (const double rtol : {1e-5, 1e-4, 1e-3, 1e-2}) {
+        for (const double stiffness : {100.0, 1000.0, 1e4}) {
+            SCOPED_TRACE(rtol);
+            SCOPED_TRACE(stiffness);
+            const auto run = expect_planned_same<ErrorControlled<Rosenbrock4>>(
+                Kicked{stiffness}, X{1, 0, 0.5, 0}, {.t_end = 20, .rtol = rtol, .atol = 0.1 * rtol},
+                false);
+            EXPECT_GT(run.statistics.events, 28u);
+        }
+    }
+}
+
 TEST(Planned, StepsThatAreTakenBackAreNotCounted)
 {
     // The run is cancelled by its own flow, wherever that is.
