@@ -339,6 +339,9 @@ private:
     /// One step with a check of its end, where planning does not pay.
     void advance_with_check(double remaining);
 
+    /// Checks the step that has been taken for all guards.
+    void check_all();
+
     void advance_by_plan(double remaining, const Advance& how);
 
     void remember_step(double proposed, std::uint64_t rejected);

@@ -9,7 +9,12 @@ template <class X, bool single>
 inline void Loop<X, single>::advance_with_check(double remaining)
 {
     this->watch_all();
-    if (!take_step(remaining)) return;
+    if (take_step(remaining)) check_all();
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::check_all()
+{
     mark_what_lasts();
     if (handle_events()) return;
     pass();
@@ -32,6 +37,7 @@ inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& ho
         }
         return;
     }
+    if (watching_) return check_all();
     const double t = step_.time(step_.h());
     const double ends = backward_ ? -t : t;
     if (planner_->covers(ends)) {
@@ -96,7 +102,8 @@ template <class X, bool single>
 inline void Loop<X, single>::judge()
 {
     if (this->judges_suspicious() && search(false)) return;
-    planner_->settle(step_, bank_);
+    if (watching_) return pass();
+    planner_->settle(step_, bank_, run_.statistics);
     if (planner_->wrong()) return this->name_wrong_bound();
     pass();
 }

@@ -192,6 +192,11 @@ inline bool Loop<X, single>::retry(double h, double proposed, double largest, do
         }
         ++run_.statistics.rejected;
         const bool finite = std::isfinite(error);
+        // Without looking ahead the surface decides how the step is shortened.
+        if (!finite && is_tentative()) {
+            end_step(Outcome::non_finite);
+            return false;
+        }
         if (!rough) h = finite ? h * step_factor(error, order) : shorten_to_surface(h);
         is_last_ = false;
         time_event_due_ = false;
@@ -209,7 +214,8 @@ template <class X, bool single>
 inline auto Loop<X, single>::time_to_surface() -> Approach
 {
     Approach first;
-    if (defers_) return first;
+    if (is_tentative()) return first;
+    if (defers_) this->watch_all();
     for (std::size_t i = 0; i < bank_.size(); ++i) {
         const GuardRecord& record = bank_[i];
         if (!record.enabled || record.info.boolean) continue;
@@ -237,7 +243,7 @@ inline double Loop<X, single>::approach_rate(std::size_t i)
 template <class X, bool single>
 inline bool Loop<X, single>::happen_where_flow_ends(double h)
 {
-    if (defers_) return false;
+    if (is_tentative()) return false;
     mark_everything();
     const Approach approach = time_to_surface();
     const std::size_t i = approach.guard;

@@ -364,7 +364,7 @@ private:
                 this->count_deferred(1);
             } else if (!planner_->wrong()) {
                 found = this->judges_suspicious() && finds(false);
-                if (!found && !ended_) planner_->settle(step_, bank_);
+                if (!found && !ended_) planner_->settle(step_, bank_, run_.statistics);
             }
         }
         if (planner_->wrong()) this->name_wrong_bound();

@@ -214,14 +214,17 @@ public:
 
     /// Defers the verified guards from the end of a step in which the exact detector has found
     /// nothing that cuts it short.
-    void settle(const Step<X>& step, Bank& bank)
+    void settle(const Step<X>& step, Bank& bank, Statistics& counts)
     {
         const double t = step.time(step.h());
         for (const std::size_t i : judged()) {
             LastCheck& check = checks_[i];
-            const double rate = check.rate;
+            Check end = check_of(t, step.x1());
+            // A step that was shortened after `wake` ends elsewhere.
+            const bool same_end = check.later_time == end.time;
+            const double rate = same_end ? check.rate : std::numeric_limits<double>::quiet_NaN();
             check.verify = false;
-            Check end{.time = clock(t), .value = check.later_value, .t = t, .x = &step.x1()};
+            end.value = value_at(i, end, step.mode(), bank, counts);
             end.bound = bound(i, end, step.mode(), bank[i].side);
             check_change(i, last_check(i), end, bank);
             plan_after(i, check, end, step.mode(), bank);

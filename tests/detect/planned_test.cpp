@@ -965,6 +965,63 @@ TEST(Planned, StepsWithARoughPolynomialAreThoseOfTheExactDetector)
     }
 }
 
+/// A tank that drains, whose flow is not a number below its outlet, and a second guard.
+struct Tank {
+    using State = X;
+    static constexpr std::size_t guard_count = 2;
+    bool refilled = true;
+
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        return {.crossing = which == 0 ? Crossing::falling : Crossing::either,
+                .resets = which == 0 && refilled};
+    }
+    void flow(double, const X& x, X& dxdt) const { dxdt = {-1 - std::sqrt(x[0]), 1, 0, 0}; }
+    double guard(std::size_t which, double, const X& x) const
+    {
+        return which == 0 ? x[0] : std::sin(2 * x[1]) + 0.3;
+    }
+    void reset(std::size_t, double, X& x) const { x[0] = 0.8; }
+    double speed_bound(std::size_t which, double, const X&) const { return which == 0 ? 2.2 : 2; }
+};
+
+TEST(Planned, AFlowThatEndsAtItsSurfaceHasTheEventsOfTheExactDetector)
+{
+    for (const bool refilled : {true, false}) {
+        for (const double h : {0.003, 0.01, 0.07}) {
+            SCOPED_TRACE(h);
+            const X start{1.1, 0, 0, 0};
+            const auto fixed =
+                expect_planned_same<Fixed>(Tank{refilled}, start, {.t_end = 3, .step = h});
+            EXPECT_EQ(fixed.outcome, refilled ? Outcome::reached_end : Outcome::non_finite);
+            const auto controlled = expect_planned_same<Controlled>(Tank{refilled}, start,
+                                                                    {.t_end = 3, .rtol = 0.1 * h});
+            EXPECT_GE(controlled.events.size(), refilled ? 7u : 1u);
+        }
+    }
+}
+
+/// A guard that is not a number beyond its surface, as far as its bound says nothing.
+struct Logarithm {
+    using State = X;
+    void flow(double, const X&, X& dxdt) const { dxdt = {1, 0, 0, 0}; }
+    double guard(double, const X& x) const { return std::log(2.5 - x[0]); }
+    void reset(double, X& x) const { x[0] = 0; }
+    double speed_bound(double, const X& x) const { return x[0] < 1 ? 1 : inf; }
+};
+
+TEST(Planned, AGuardThatIsNotANumberBeyondItsSurfaceHasTheEventsOfTheExactDetector)
+{
+    for (const double h : {0.01, 0.3, 1.3, 2.0}) {
+        SCOPED_TRACE(h);
+        const X start{0, 0, 0, 0};
+        const auto run =
+            expect_planned_same<Fixed>(Logarithm{}, start, {.t_end = 10, .step = h}, false);
+        EXPECT_EQ(run.events.size(), 6u);
+        expect_planned_same<Controlled>(Logarithm{}, start, {.t_end = 10, .step = h}, false);
+    }
+}
+
 TEST(Planned, StepsThatAreTakenBackAreNotCounted)
 {
     // The run is cancelled by its own flow, wherever that is.
