@@ -187,7 +187,7 @@ inline bool EventEngine<X, single>::judges_suspicious()
 {
     planner_->wake(step_, bank_, run_.statistics, last_h_);
     for (const std::size_t i : planner_->judged()) {
-        if (bank_.suspicious(i, step_.h())) return true;
+        if (bank_.leaves_plateau(i) || bank_.suspicious(i, step_.h())) return true;
     }
     run_.statistics.evidence.add(finders_.detector.evidence);
     for (const std::size_t i : planner_->judged()) bank_.leave_plateau(i);

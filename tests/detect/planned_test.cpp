@@ -1051,6 +1051,28 @@ TEST(Planned, StepsThatAreTakenBackAreNotCounted)
     EXPECT_GT(taken_back, 0u);
 }
 
+TEST(Planned, AGuardThatLeavesItsPlateauHasItsEvent)
+{
+    // It stands on its surface until the force begins.
+    struct Waiting {
+        using State = X;
+        double sign = 1;
+        void flow(double t, const X& x, X& dxdt) const
+        {
+            dxdt = {x[2], 0, t < 1 ? 0 : -sign * std::pow(t - 1, 3), 0};
+        }
+        GuardInfo guard_info() const { return {.unilateral = true}; }
+        double guard(double, const X& x) const { return x[0]; }
+        void reset(double, X& x) const { x = {0, x[1] + 1, 1, 0}; }
+        double speed_bound(double, const X&) const { return 30; }
+    };
+    const Options options{.t_end = 2.5, .step = 0.01};
+    const auto pressed = expect_planned_same<Fixed>(Waiting{1}, X{0, 0, 0, 0}, options);
+    EXPECT_GT(pressed.events.size(), 0u);
+    const auto lifted = expect_planned_same<Fixed>(Waiting{-1}, X{0, 0, 0, 0}, options);
+    EXPECT_EQ(lifted.events.size(), 0u);
+}
+
 TEST(Planned, RefusesPlansThatAreNone)
 {
     EXPECT_THROW(Planned({.margin = -0.1}), std::invalid_argument);
