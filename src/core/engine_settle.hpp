@@ -197,8 +197,10 @@ inline bool EventEngine<X, single>::is_flipped_by_rounding(std::size_t i, Side b
     if (record.fired || record.newly_enabled || record.info.boolean) return false;
     if (before == Side::plateau || side_of(g) != opposite(before)) return false;
     // Otherwise the reset of another guard has carried it across, by more than rounding.
-    const double moves = std::fabs(bank_.rate0(i)) * (std::fabs(step_.time(0)) + h_next_);
-    if (!(std::fabs(g) <= 0x1p-20 * std::max(bank_.scale(i, h_next_), moves))) return false;
+    const double rate = system_->bounded ? bank_.complete_rate0(i, step_, h_next_, calls())
+                                         : bank_.rate0(i);  // which may not be known otherwise
+    const double moves = std::fabs(rate) * (std::fabs(step_.time(0)) + h_next_);
+    if (!(std::fabs(g) <= 0x1p-20 * std::max(bank_.armed_scale(i, h_next_), moves))) return false;
     return std::fabs(g) <= rounding_of(i);
 }
 

@@ -227,6 +227,13 @@ public:
                                    std::fabs(g1_[i] - rate1_[i] * (h / 3))));
     }
 
+    /// The same for a guard that has just been sampled at the start of a step. A guard with bounds
+    /// may have slept, and its other samples are of any earlier step.
+    [[nodiscard]] double armed_scale(std::size_t i, double h) const noexcept
+    {
+        return rules_.bounded ? sizes_[i] : scale(i, h);
+    }
+
     void arm(std::size_t i, Side side) noexcept
     {
         GuardRecord& record = records_[i];

@@ -117,12 +117,14 @@ struct BankRules {
     /// Whether brackets are not narrowed below the rounding of the sizes with which smooth phases
     /// started, as for guards with declared bounds, which may be expensive.
     bool coarse = false;
+    /// Whether guards declare bounds: then these sizes are kept for any detector.
+    bool bounded = false;
     /// Whether guards can be examined inside a step.
     bool checks_inside = false;
     bool (*suspects)(double, double, double, double, double, double) = nullptr;
 
     /// Whether sizes are kept from step to step.
-    [[nodiscard]] bool keeps_sizes() const noexcept { return remembers || coarse; }
+    [[nodiscard]] bool keeps_sizes() const noexcept { return remembers || bounded; }
 
     template <class X>
     [[nodiscard]] static BankRules of(const DetectorTable<X>& detector, const SystemAt<X>& system)
@@ -133,6 +135,7 @@ struct BankRules {
                 .defers = detail::defers(detector, *system.operator->()),
                 .remembers = detector.uses_rates && !detector.checks_inside && !bounded,
                 .coarse = detector.uses_rates && bounded,
+                .bounded = bounded,
                 .checks_inside = detector.checks_inside && !bounded,
                 .suspects = detector.suspects};
     }

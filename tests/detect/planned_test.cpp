@@ -1073,6 +1073,30 @@ TEST(Planned, AGuardThatLeavesItsPlateauHasItsEvent)
     EXPECT_EQ(lifted.events.size(), 0u);
 }
 
+template <class Exact>
+void expect_no_event_of_rounding()
+{
+    // The time event puts the guard on its surface, where 0.3 - 0.1 - 0.2 is -3e-17, and rising.
+    struct Put {
+        using State = X;
+        void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], 0, 0, 0}; }
+        double guard(double, const X& x) const { return x[0] - 0.1 - 0.2; }
+        void reset(double, X& x) const { x[1] += 1; }
+        double speed_bound(double, const X&) const { return 1; }
+        double next_time_event(double t) const { return t < 0.5 ? 0.5 : inf; }
+        void time_reset(double, X& x) const { x = {0.3, 0, 1, 0}; }
+    };
+    const auto run =
+        expect_planned_same<Fixed, Exact>(Put{}, X{2, 0, 0.1, 0}, {.t_end = 2, .step = 0.01});
+    EXPECT_EQ(run.events.size(), 1u);
+}
+
+TEST(Planned, AResetOntoTheSurfaceIsNoCrossing)
+{
+    expect_no_event_of_rounding<Extremum>();
+    expect_no_event_of_rounding<Ends>();
+}
+
 TEST(Planned, RefusesPlansThatAreNone)
 {
     EXPECT_THROW(Planned({.margin = -0.1}), std::invalid_argument);
