@@ -101,7 +101,7 @@ bool Loop<X, single>::may_take_more_steps()
 template <class X, bool single>
 inline void Loop<X, single>::reach_end()
 {
-    if (defers_) {
+    if (defers_ && !newly_armed_ && !resting_) {
         planner_->check_last(step_, bank_, run_.statistics);
         if (planner_->wrong()) return this->name_wrong_bound();
     }

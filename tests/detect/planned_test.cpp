@@ -1097,6 +1097,44 @@ TEST(Planned, AResetOntoTheSurfaceIsNoCrossing)
     expect_no_event_of_rounding<Ends>();
 }
 
+TEST(Planned, ATimeEventAtTheEndAccusesNoBound)
+{
+    // Its reset moves the guard by more than the bound of the flow allows.
+    struct Moved {
+        using State = X;
+        void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], 0, 0, 0}; }
+        double guard(double, const X& x) const { return x[0]; }
+        double speed_bound(double, const X&) const { return 1; }
+        double next_time_event(double t) const { return t < 0.5 ? 0.5 : inf; }
+        void time_reset(double, X& x) const { x[0] = 9; }
+    };
+    const auto run =
+        expect_planned_same<Fixed>(Moved{}, X{2, 0, 0.1, 0}, {.t_end = 0.5, .step = 0.01});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.events.size(), 1u);
+}
+
+TEST(Planned, AMotionThatComesToRestInTheLastStepAccusesNoBound)
+{
+    struct Lump {
+        using State = X;
+        bool unilateral = true;
+        void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], 0, -10, 0}; }
+        double guard(double, const X& x) const { return x[0]; }
+        void reset(double, X& x) const { x = {0, x[1], -0.1 * x[2], 0}; }
+        void rest(double, X& x) const { x = {0, x[1], 0, 0}; }
+        double speed_bound(double, const X& x) const { return std::fabs(x[2]); }
+        double acceleration_bound(double, const X&) const { return 10; }
+    };
+    // The impacts end after 0.546 s.
+    for (const double end : {0.55, 0.57, 0.59}) {
+        const auto run =
+            expect_planned_same<Fixed>(Lump{}, X{1, 0, 0, 0}, {.t_end = end, .step = 0.1}, false);
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        EXPECT_EQ(run.events.back().kind, EventKind::accumulation);
+    }
+}
+
 TEST(Planned, RefusesPlansThatAreNone)
 {
     EXPECT_THROW(Planned({.margin = -0.1}), std::invalid_argument);
