@@ -275,20 +275,7 @@ public:
     /// put a guard that starts on its surface behind it. So the difference is subtracted, all
     /// of it at the start and none at the end, and over the first unit in the last place of the
     /// time the path is straight.
-    void align_start() const
-    {
-        StepState<X>& of = state_;
-        of.host->interpolate(of.host->host, 0, of.at.data(), of.x0.size());
-        assign(defect_, of.at);
-        bool differs = false;
-        for_components([&](auto i) {
-            defect_[i] = of.x0[i] - of.at[i];
-            differs = differs || defect_[i] != 0;
-        });
-        aligned_ = differs;
-        const double t = std::fabs(of.start.value);
-        straight_ = std::nextafter(t, std::numeric_limits<double>::infinity()) - t;
-    }
+    void align_start() const;
 
     /// Accepts a step that a host has taken.
     void accept_shown() noexcept
@@ -475,43 +462,11 @@ private:
         if (kernel_->take) flow(0, state_.x0, state_.rate0);
     }
 
-    void interpolate_on_host(double s, X& x) const
-    {
-        const HostStepTable& host = *state_.host;
-        if (aligned_ && s < straight_) return detail::move(x, state_.x0, s, state_.rate0);
-        host.interpolate(host.host, s, x.data(), state_.x0.size());
-        if (!aligned_) return;
-        const double left = 1 - s / host.h;
-        for_components([&](auto i) { x[i] += left * defect_[i]; });
-    }
-
-    void restep_on_host(double s, X& x) const
-    {
-        const HostStepTable& host = *state_.host;
-        if (!host.restep) {
-            interpolate_on_host(s, x);
-        } else {
-            host.restep(host.host, s, x.data(), state_.x0.size());
-        }
-        for (std::size_t i = 0; i < state_.x0.size(); ++i) {
-            if (!std::isfinite(x[i])) throw_host_not_finite(i, x[i], s, host.restep != nullptr);
-        }
-    }
-
+    void interpolate_on_host(double s, X& x) const;
+    void restep_on_host(double s, X& x) const;
     /// Over a ten-thousandth of the step the rounding error and the curvature error of a difference
     /// quotient are of similar size.
-    void rate_on_host(double s, X& dxdt) const
-    {
-        const HostStepTable& host = *state_.host;
-        if (host.rate) return host.rate(host.host, s, dxdt.data(), state_.x0.size());
-        const double reach = 1e-4 * host.h;
-        const double from = std::max(0.0, s - reach);
-        const double to = std::min(host.h, s + reach);
-        X& at = state_.at;
-        interpolate_on_host(from, at);
-        interpolate_on_host(to, dxdt);
-        for_components([&](auto i) { dxdt[i] = (dxdt[i] - at[i]) / (to - from); });
-    }
+    void rate_on_host(double s, X& dxdt) const;
 
     void unpin() noexcept { pinned_h_ = std::numeric_limits<double>::quiet_NaN(); }
 
@@ -621,3 +576,5 @@ private:
 };
 
 }  // namespace ricochet::detail
+
+#include "core/step_on_host.hpp"
