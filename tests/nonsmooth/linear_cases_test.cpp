@@ -6,6 +6,7 @@
 
 #include <Eigen/LU>
 
+#include <limits>
 #include <random>
 
 #include "ricochet/detail/any_inclusion.hpp"
@@ -50,6 +51,31 @@ TEST(LinearInequality, CasesSolveRandomOnes)
         check_random_inequalities<2>(confines);
         check_random_inequalities<3>(confines);
         check_random_inequalities<4>(confines);
+    }
+}
+
+TEST(LinearInequality, ReactionsThatDependOnOneAnotherUpToRoundingAreNotHeldByHugeOnes)
+{
+    // Two stops on both sides of a direction of three components, both open: no reaction acts. To
+    // rounding W is regular, and huge reactions that cancel would hold both.
+    std::mt19937 random(1);
+    std::uniform_real_distribution<double> uniform(0.3, 2);
+    for (int trial = 0; trial < 2000; ++trial) {
+        const Eigen::Vector3d along(uniform(random), -uniform(random), uniform(random));
+        const double one = uniform(random), other = -uniform(random);
+        Eigen::Matrix<double, 2, 3> e;
+        e << one * along.transpose(), other * along.transpose();
+        LinearInequality<2> p;
+        p.w = uniform(random) * e * e.transpose();
+        p.y0 << uniform(random), uniform(random);
+        p.lower.setZero();
+        p.upper.setConstant(std::numeric_limits<double>::infinity());
+        LinearInequality<2>::Branches branches;
+        branches.setConstant(Branch::inside);
+        Eigen::Vector2d r, y;
+        ASSERT_TRUE(p.solve(r, y, branches));
+        EXPECT_EQ(r, Eigen::Vector2d(0, 0));
+        EXPECT_EQ(y, p.y0);
     }
 }
 

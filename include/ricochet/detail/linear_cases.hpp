@@ -186,6 +186,24 @@ private:
         return true;
     }
 
+    /// Whether the held reactions are determined by their y, and not by the rounding of a W that is
+    /// singular for them, whose huge solutions cancel.
+    [[nodiscard]] bool determines(const Branches& branches, const Vector& reaction) const
+    {
+        double given = 0, answers = 0;
+        for (Eigen::Index i = 0; i < y0.size(); ++i) {
+            if (!held(branches[i])) continue;
+            double known = std::abs(y0[i]) + std::abs(target(i, branches[i]));
+            double unknown = 0;
+            for (Eigen::Index j = 0; j < y0.size(); ++j) {
+                (held(branches[j]) ? unknown : known) += std::abs(w(i, j) * reaction[j]);
+            }
+            given = std::max(given, known);
+            answers = std::max(answers, unknown);
+        }
+        return answers <= 1e12 * given;
+    }
+
     [[nodiscard]] bool solve_one(Vector& reaction, Vector& y, Branches& branches) const
     {
         const double w11 = w(0, 0);
@@ -215,16 +233,19 @@ private:
 template <int M>
 bool LinearInequality<M>::search(Vector& reaction, Vector& y, Branches& branches) const
 {
-    if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
+    const auto fit = [&] { return solve_on(branches, reaction, y) && fits(branches, reaction, y); };
+    if (fit() && determines(branches, reaction)) return true;
     const int m = static_cast<int>(y0.size());
     if (m > most_cases) return solve_by_pivots(reaction, y, branches);
     int count = 1;
     for (int i = 0; i < m; ++i) count *= 3;
-    for (int code = 0; code < count; ++code) {
-        for (int i = 0, rest = code; i < m; ++i, rest /= 3) {
-            branches[i] = static_cast<Branch>(rest % 3 - 1);
+    for (const bool any : {false, true}) {
+        for (int code = 0; code < count; ++code) {
+            for (int i = 0, rest = code; i < m; ++i, rest /= 3) {
+                branches[i] = static_cast<Branch>(rest % 3 - 1);
+            }
+            if (fit() && (any || determines(branches, reaction))) return true;
         }
-        if (solve_on(branches, reaction, y) && fits(branches, reaction, y)) return true;
     }
     return false;
 }
