@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "ricochet/nonsmooth/convex_sets.hpp"
@@ -71,6 +72,21 @@ TEST(ConvexSets, AFrictionConeHasAnInsideAPolarAndASide)
     EXPECT_EQ(derivative(cone, {0, 0, 0}), Values(9, 0.0));
     // Without friction it is the half line of the normal.
     EXPECT_EQ(projected(FrictionCone<3>(0), {2, 1, 1}), (Values{2, 0, 0}));
+}
+
+TEST(ConvexSets, AFrictionConeMayBeAlmostAHalfSpace)
+{
+    // The square of this coefficient overflows.
+    const FrictionCone<3> cone(1e200);
+    EXPECT_EQ(projected(cone, {-1, 3, 4}), (Values{5e-200, 3, 4}));
+    const Values d = derivative(cone, {-1, 3, 4});
+    for (std::size_t i = 1; i < 3; ++i) {
+        for (std::size_t j = 1; j < 3; ++j) EXPECT_NEAR(d[i * 3 + j], i == j ? 1 : 0, 1e-15);
+    }
+    EXPECT_NO_THROW(check_projection(cone));
+    EXPECT_EQ(cone.fault(), "");
+    const FrictionCone<3> infinite(std::numeric_limits<double>::infinity());
+    EXPECT_EQ(infinite.fault(), "has an infinite coefficient of friction");
 }
 
 TEST(ConvexSets, AProductTreatsItsFactorsApart)

@@ -248,7 +248,7 @@ class FrictionCone {
     static_assert(N >= 2);
 
 public:
-    /// Takes the coefficient of friction.
+    /// Takes the coefficient of friction, finite.
     explicit constexpr FrictionCone(double friction) noexcept : friction_(friction) {}
 
     [[nodiscard]] static constexpr std::size_t dimension() noexcept { return N; }
@@ -267,7 +267,7 @@ public:
         } else if (tangent <= friction_ * normal) {
             p[0] = normal;
         } else {
-            p[0] = (normal + friction_ * tangent) / (1 + friction_ * friction_);
+            p[0] = on_side(normal, tangent);
             factor = friction_ * p[0] / tangent;
         }
         for (std::size_t i = 1; i < N; ++i) {
@@ -286,15 +286,15 @@ public:
             }
             return;
         }
-        const double share = 1 / (1 + friction_ * friction_);
-        const double s = share * (z[0] + friction_ * tangent);
-        d[0] = share;
+        const double s = on_side(z[0], tangent);
+        const double slope = on_side(0, 1);
+        d[0] = on_side(1, 0);
         for (std::size_t i = 1; i < N; ++i) {
             const double e = z[i] / tangent;
-            d[i] = d[i * N] = share * friction_ * e;
+            d[i] = d[i * N] = slope * e;
             for (std::size_t j = 1; j < N; ++j) {
                 const double along = e * z[j] / tangent;
-                d[i * N + j] = share * friction_ * friction_ * along +
+                d[i * N + j] = friction_ * slope * along +
                                friction_ * s / tangent * ((i == j ? 1.0 : 0.0) - along);
             }
         }
@@ -302,12 +302,20 @@ public:
 
     [[nodiscard]] constexpr std::string_view fault() const noexcept
     {
-        if (friction_ >= 0) return "";
+        if (friction_ >= 0 && friction_ < std::numeric_limits<double>::infinity()) return "";
+        if (friction_ > 0) return "has an infinite coefficient of friction";
         return friction_ < 0 ? "has a negative coefficient of friction"
                              : "has a coefficient of friction that is not a number";
     }
 
 private:
+    /// (normal + friction tangent) / (1 + friction^2), whose square must not overflow.
+    [[nodiscard]] double on_side(double normal, double tangent) const noexcept
+    {
+        if (friction_ > 1) return (normal / friction_ + tangent) / (friction_ + 1 / friction_);
+        return (normal + friction_ * tangent) / (1 + friction_ * friction_);
+    }
+
     [[nodiscard]] static double tangential(std::span<const double> z) noexcept
     {
         double length = 0;
