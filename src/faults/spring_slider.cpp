@@ -85,7 +85,8 @@ public:
         : slider_(slider),
           options_(options),
           law_(slider.friction),
-          step_(law_, slider.block, options.order)
+          step_(law_, slider.block, options.order),
+          stopping_(law_, slider.block, 2)
     {
         validate_options(options);
     }
@@ -116,13 +117,25 @@ public:
                 const double factor =
                     0.9 * std::pow(std::max(error, 1e-10), -1.0 / estimate_order());
                 if (error > 1) {
-                    ++out_.rejected;
-                    h = taken * std::clamp(factor, 0.1, 0.9);
-                    if (h < 1e-14 * std::abs(out_.state.t) + 1e-300) {
-                        return stop(Outcome::step_underflow);
+                    const double shorter = taken * std::clamp(factor, 0.1, 0.9);
+                    if (shorter < 1e-14 * std::abs(out_.state.t) + 1e-300) {
+                        if (!misses_slip_rate(report, to) || ++shortest_ > 1000) {
+                            return stop(Outcome::step_underflow);
+                        }
+                        // By order 2, since order 4 may leave it creeping.
+                        to = out_.state;
+                        const StepReport last = stopping_.take(to, taken, slider_.load);
+                        if (!last.solved()) return stop(Outcome::step_underflow);
+                        if (to_stop) to.t = stop_at;
+                        accept(to, last);
+                        h = taken;
+                        continue;
                     }
+                    ++out_.rejected;
+                    h = shorter;
                     continue;
                 }
+                shortest_ = 0;
                 h = (to_stop ? std::max(h, taken) : taken) * std::clamp(factor, 0.2, 5.0);
             } else if (!report.solved()) {
                 return stop(Outcome::not_converged);
@@ -163,6 +176,15 @@ private:
         const double v =
             std::abs(e.v) / (std::max(std::abs(to.v), std::abs(out_.state.v)) + 1e-6 * p.v_star);
         return std::max({x, v, std::abs(e.xi)}) / options_.rtol;
+    }
+
+    /// Whether only the slip rate of a step misses the tolerance. Where a block stops or turns back
+    /// it may change by decades within the resolution of time, and no shorter step is better.
+    [[nodiscard]] bool misses_slip_rate(const StepReport& report, const SliderState& to) const
+    {
+        SliderState rest = report.error;
+        rest.v = 0;
+        return report.solved() && norm(rest, to) <= 1;
     }
 
     void accept(const SliderState& to, const StepReport& report)
@@ -282,8 +304,10 @@ private:
     const SliderOptions& options_;
     Law law_;
     VariationalStep<Law> step_;
+    VariationalStep<Law> stopping_;  // brings the block to rest
     SliderRun out_{};
     double spacing_ = 0, first_ = 0;
+    int shortest_ = 0;  // number of consecutive steps of the shortest length
 };
 
 }  // namespace

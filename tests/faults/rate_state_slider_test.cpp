@@ -51,6 +51,43 @@ TEST(RateStateSlider, HasTheEventsOfVariationalSteps)
     EXPECT_NEAR(loop.x[0] * 1e-6, steps.state.x, 1e-12);
 }
 
+// Friction stops these blocks, which then creep or slide back, within the resolution of time.
+TEST(RateStateSlider, StopsWithinTheResolutionOfTime)
+{
+    SpringSlider creeping;
+    creeping.friction = {.a = 0.0045964490879702325,
+                         .b = 0.014733529198414129,
+                         .f_star = 0.78937926333736363,
+                         .v_star = 1.2672082298855943e-06,
+                         .d_rs = 4.0241288814008634e-07};
+    creeping.evolution = StateEvolution::prz;
+    creeping.block = {.mass = 0.023507186209987738,
+                      .stiffness = 211161.77215733367,
+                      .normal_force = 18.857885154629873};
+    creeping.load =
+        SliderLoad(7.0495825732940759e-05,
+                   {{0, 5.1395195382155542e-07}, {1.49675806688722, 1.5671842779168046e-06}});
+    const SliderState start{.v = 6.3123819580566046e-06, .xi = 1.5662212298018794};
+    SliderRun last;
+    for (const double rtol : {1e-5, 1e-6, 1e-7}) {
+        const SliderRun run = run_slider(
+            creeping, start, {.t_end = 3.7418951672180496, .rtol = rtol, .threshold = 6.6e-7});
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
+        ASSERT_EQ(run.events.size(), 3U);
+        EXPECT_NEAR(run.events[2].at.t, 3.0379365782, 1e-8);
+        EXPECT_LT(run.state.v, 1e-20);
+        last = run;
+    }
+    EXPECT_NEAR(last.state.xi, 0.7962468, 1e-6);
+
+    SpringSlider turning = stick_slip();
+    const double back = -2e-4;
+    const SliderRun run = run_slider(turning, {.v = back}, {.t_end = 1e-3, .rtol = 1e-10});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_FALSE(run.events.empty());
+    EXPECT_EQ(run.events[0].kind, SliderEventKind::reversal);
+}
+
 TEST(RateStateSlider, RefusesWhatItIsNotFor)
 {
     SpringSlider slider = stick_slip();
