@@ -201,10 +201,13 @@ private:
         out_.not_convex += static_cast<std::size_t>(report.not_convex);
         out_.residual = std::max(out_.residual, report.residual);
         const SliderState from = out_.state;
+        const auto known = static_cast<std::ptrdiff_t>(out_.events.size());
         if (options_.threshold > 0) {
             locate(from, to, options_.threshold, SliderEventKind::onset, SliderEventKind::arrest);
         }
         locate(from, to, 0, SliderEventKind::reversal, SliderEventKind::reversal);
+        std::ranges::stable_sort(out_.events.begin() + known, out_.events.end(), {},
+                                 [](const SliderEvent& event) { return event.at.t; });
         sample_until(from, to, to.t);
         out_.state = to;
     }
@@ -315,6 +318,9 @@ private:
 SliderRun run_slider(const SpringSlider& slider, const SliderState& start,
                      const SliderOptions& options)
 {
+    for (const double component : {start.t, start.x, start.v, start.xi}) {
+        detail::require_finite("run_slider", "start", component);
+    }
     switch (slider.evolution) {
         case StateEvolution::slip: return Runner<SlipLaw<>>(slider, options).run(start);
         case StateEvolution::prz: return Runner<PrzLaw<>>(slider, options).run(start);

@@ -22,6 +22,7 @@ public:
         for (const Entry& entry : heap_) place_[entry.body] = none;
         heap_.clear();
         ring_ = with_ring;
+        ahead_ = none;
         if (!ring_) return;
         times_.resize(place_.size(), no_instant);
         is_late_.resize(place_.size(), 0);
@@ -34,8 +35,20 @@ public:
         origin_ = inverse_ = 0;
     }
     /// Whether there is no entry. After a call that returns false, `first` precedes all others.
-    [[nodiscard]] bool empty()
+    /// Before that it calls `fetch` with a body that acts soon, whose records may be far away in
+    /// memory.
+    template <class Fetch>
+    [[nodiscard]] bool empty(const Fetch& fetch)
     {
+        if (ahead_ != none) {
+            const auto [body, next] = nodes_[ahead_];
+            ahead_ = next;
+            if (next != none) __builtin_prefetch(&nodes_[next]);
+            __builtin_prefetch(&times_[body]);
+            __builtin_prefetch(&place_[body]);
+            __builtin_prefetch(&is_late_[body]);
+            fetch(body);
+        }
         while (ring_ && heap_.empty()) {
             if (present_ + 1 >= lists_.size()) {
                 if (!turn()) break;
@@ -114,6 +127,7 @@ private:
             free_ = node;
             node = next;
         }
+        ahead_ = list + 1 < lists_.size() ? lists_[list + 1] : none;
     }
     /// Builds new lists when all entries are late. The first quarter of the entries determines
     /// their width, such that it has `in_a_list` entries a list. So a turn of the ring has at least
@@ -236,6 +250,7 @@ private:
         lists_;  ///< their first nodes; list k begins at origin + k / inverse
     std::vector<Node> nodes_;
     std::uint32_t free_ = none;
+    std::uint32_t ahead_ = none;  ///< node of the next list that is fetched next
     std::size_t present_ = 0;
     double origin_ = 0, inverse_ = 0;
     std::vector<std::uint32_t> late_, waiting_;  ///< entries beyond the last list

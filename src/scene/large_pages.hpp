@@ -30,4 +30,12 @@ void reserve_large(std::vector<T>& list, std::size_t count)
 #endif
 }
 
+/// Asks for a record before it is used.
+template <class T>
+void fetch_record(const T& record) noexcept
+{
+    const auto* const first = reinterpret_cast<const char*>(&record);
+    for (std::size_t at = 0; at < sizeof(T); at += 64) __builtin_prefetch(first + at);
+}
+
 }  // namespace ricochet::detail

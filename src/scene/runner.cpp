@@ -72,7 +72,14 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
     fail_where_broken();
     const auto bodies = static_cast<std::uint32_t>(world_.bodies.size());
     const SceneOptions& options = world_.options;
-    while (!result_.failure && !calendar_.empty()) {
+    const auto fetch = [&](std::uint32_t who) {
+        if (who >= bodies) return;
+        fetch_record(world_.bodies[who]);
+        fetch_record(pending_[who]);
+        fetch_record(series_[who]);
+        fetch_record(slots_[who]);
+    };
+    while (!result_.failure && !calendar_.empty(fetch)) {
         const Instant t = calendar_.first_time();
         if (before(t_end_, t)) break;
         if (next_sample_ < options.sample_times.size()) sample_until(t, false, samples);

@@ -287,6 +287,12 @@ TEST(SpringSlider, RefusesWhatMakesNoSense)
     EXPECT_THROW((void)run_slider(c.slider, start, {.order = 3}), std::invalid_argument);
     EXPECT_THROW((void)run_slider(c.slider, start, {.t_end = 0}), std::invalid_argument);
     EXPECT_THROW((void)run_slider(c.slider, start, {.step = -1e-3}), std::invalid_argument);
+    for (double SliderState::*const component :
+         {&SliderState::t, &SliderState::x, &SliderState::v, &SliderState::xi}) {
+        SliderState broken = start;
+        broken.*component = std::nan("");
+        EXPECT_THROW((void)run_slider(c.slider, broken, {}), std::invalid_argument);
+    }
     SliderState s = start;
     const VariationalStep<AgeingLaw<>> step(AgeingLaw<>(), c.slider.block, 1);
     EXPECT_THROW((void)step.take(s, 0, c.slider.load), std::invalid_argument);

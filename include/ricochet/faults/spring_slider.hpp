@@ -100,7 +100,8 @@ struct SliderRun {
 /// repeating the step. Two crossings within a step are found if the cubic through slip rates and
 /// accelerations shows them.
 ///
-/// @throws std::invalid_argument for parameters or options outside their range.
+/// @throws std::invalid_argument for parameters or options outside their range, and a start that is
+/// not finite.
 [[nodiscard]] SliderRun run_slider(const SpringSlider& slider, const SliderState& start,
                                    const SliderOptions& options = {});
 
