@@ -35,7 +35,11 @@ public:
         origin_ = inverse_ = 0;
     }
     /// Whether there is no entry. After a call that returns false, `first` precedes all others.
-    /// Before that it calls `fetch` with a body that acts soon, whose records may be far away in
+    [[nodiscard]] bool empty()
+    {
+        return empty([](std::uint32_t /*body*/) {});
+    }
+    /// The same, and calls `fetch` with a body that acts soon, whose records may be far away in
     /// memory.
     template <class Fetch>
     [[nodiscard]] bool empty(const Fetch& fetch)
