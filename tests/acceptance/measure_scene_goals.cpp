@@ -259,7 +259,7 @@ Measured compare_plain_run()
 Measured relabel_bodies()
 {
     Measured out{.pass = true, .text = "the same bits"};
-    for (const std::size_t count : {100, 1000}) {
+    for (const std::size_t count : {100U, 1000U}) {
         for (const unsigned seed : {7U, 8U, 9U}) {
             std::vector<std::size_t> order(count);
             std::iota(order.begin(), order.end(), 0U);
@@ -280,7 +280,7 @@ Measured relabel_bodies()
 Measured reverse_gases()
 {
     Measured out{.pass = true, .text = ""};
-    for (const std::size_t count : {10, 100, 1000}) {
+    for (const std::size_t count : {10U, 100U, 1000U}) {
         const double apart = lead_back(count);
         out.pass = out.pass && apart <= 1e-10;
         out.text += fmt::format("{}{:.1e} at {}", out.text.empty() ? "" : ", ", apart, count);

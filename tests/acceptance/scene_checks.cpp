@@ -134,7 +134,7 @@ Measured conserve()
     Measured out{.pass = true, .text = ""};
     double energy_error = 0;
     double overlap = -1;
-    for (const std::size_t count : {10, 100, 1000}) {
+    for (const std::size_t count : {10U, 100U, 1000U}) {
         const Scene scene = test::gas({.count = count});
         const double size = std::sqrt(static_cast<double>(count));
         const double t_end = 6e5 / (static_cast<double>(count) * size);

@@ -1055,7 +1055,6 @@ TEST(Planned, AGuardThatLeavesItsPlateauHasItsEvent)
 {
     // It stands on its surface until the force begins.
     struct Waiting {
-        using State = X;
         double sign = 1;
         void flow(double t, const X& x, X& dxdt) const
         {
@@ -1078,7 +1077,6 @@ void expect_no_event_of_rounding()
 {
     // The time event puts the guard on its surface, where 0.3 - 0.1 - 0.2 is -3e-17, and rising.
     struct Put {
-        using State = X;
         void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], 0, 0, 0}; }
         double guard(double, const X& x) const { return x[0] - 0.1 - 0.2; }
         void reset(double, X& x) const { x[1] += 1; }
@@ -1101,7 +1099,6 @@ TEST(Planned, ATimeEventAtTheEndAccusesNoBound)
 {
     // Its reset moves the guard by more than the bound of the flow allows.
     struct Moved {
-        using State = X;
         void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], 0, 0, 0}; }
         double guard(double, const X& x) const { return x[0]; }
         double speed_bound(double, const X&) const { return 1; }
@@ -1117,7 +1114,6 @@ TEST(Planned, ATimeEventAtTheEndAccusesNoBound)
 TEST(Planned, AMotionThatComesToRestInTheLastStepAccusesNoBound)
 {
     struct Lump {
-        using State = X;
         bool unilateral = true;
         void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], 0, -10, 0}; }
         double guard(double, const X& x) const { return x[0]; }

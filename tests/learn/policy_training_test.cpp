@@ -27,6 +27,7 @@ struct Trainer {
     std::string name;
     std::function<TrainedPolicy(const Environment&, const PolicyTraining&, const PolicyCallback&)>
         train;
+    // NOLINTNEXTLINE(readability-identifier-naming): the name that GoogleTest looks for
     friend void PrintTo(const Trainer& trainer, std::ostream* out) { *out << trainer.name; }
 };
 
