@@ -94,6 +94,7 @@ private:
     [[nodiscard]] double size_of_works(const Cluster& cluster) const;
     bool solve_exactly(Cluster& cluster) const;
     void sweep(Cluster& cluster, double smallest, int most) const;
+    void stop_slow(Cluster& cluster) const;
     bool wave(Cluster& cluster);
     void emit(const Cluster& cluster, double t, std::vector<SceneEvent>* events);
 

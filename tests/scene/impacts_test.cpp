@@ -66,6 +66,59 @@ TEST(Impacts, RestitutionAndFrictionTogetherGainNoEnergy)
     }
 }
 
+/// Discs in a box, some without restitution, all with friction: they come together in clusters,
+/// past which others slide.
+Scene sticky(unsigned seed)
+{
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    Scene scene;
+    const MaterialId soft = scene.material({.restitution = 0, .friction = 0.3});
+    const MaterialId hard = scene.material({.restitution = 1, .friction = 0.45});
+    for (const Vector2& normal : {Vector2{0, 1}, Vector2{1, 0}, Vector2{0, -1}, Vector2{-1, 0}}) {
+        const Vector2 corner{normal[0] < 0 ? 6.0 : 0.0, normal[1] < 0 ? 6.0 : 0.0};
+        scene.wall({.point = corner, .normal = normal, .material = hard});
+    }
+    for (int k = 0; k < 36; ++k) {
+        Disc disc;
+        disc.at = {0.5 + k % 6, 0.5 + k / 6};
+        for (double& x : disc.at) x += 0.05 * uniform(random);
+        for (double& v : disc.velocity) v = 2 * uniform(random);
+        disc.radius = 0.35 + 0.08 * uniform(random);
+        disc.mass = 1 + 0.5 * uniform(random);
+        disc.material = uniform(random) < -0.3 ? soft : hard;
+        scene.disc(disc);
+    }
+    return scene;
+}
+
+/// The largest number of events at one time.
+std::size_t most_at_once(const std::vector<SceneEvent>& events)
+{
+    std::size_t most = 0, count = 0;
+    for (std::size_t k = 0; k < events.size(); ++k) {
+        if (k > 0 && events[k].number == events[k - 1].number) continue;
+        count = k > 0 && events[k].t == events[k - 1].t ? count + 1 : 1;
+        most = std::max(most, count);
+    }
+    return most;
+}
+
+TEST(Impacts, ClustersWithoutRestitutionAreStruckOnce)
+{
+    for (unsigned seed = 0; seed < 60; ++seed) {
+        const SceneRun run = simulate(sticky(seed), {.t_end = 20, .max_events = 20'000});
+        EXPECT_EQ(run.outcome, Outcome::reached_end) << seed << ": " << run.message;
+        // A disc that bounces in a gap that closes has many impacts within a few ulp.
+        EXPECT_LE(most_at_once(run.events), 50u) << seed;
+        for (std::size_t i = 0; i < run.bodies.size(); ++i) {
+            for (const double x : run.bodies[i].at) {
+                EXPECT_NEAR(x, 3, 3.001 - 0.27) << seed << " " << i;
+            }
+        }
+    }
+}
+
 TEST(Impacts, ASmallDiscIsMetAfterALongWay)
 {
     Scene scene;
