@@ -200,6 +200,28 @@ private:
         if (a.t.remainder != b.t.remainder) return a.t.remainder < b.t.remainder;
         return a.body < b.body;
     }
+    /// The first of four children. Which one it is cannot be predicted: it is selected by values,
+    /// without branches, unless the times of two are equal.
+    [[nodiscard]] std::uint32_t first_of_four(std::uint32_t child) const noexcept
+    {
+        const double a = heap_[child].t.value, b = heap_[child + 1].t.value;
+        const double c = heap_[child + 2].t.value, d = heap_[child + 3].t.value;
+        const std::uint32_t ab = child + static_cast<std::uint32_t>(b < a);
+        const std::uint32_t cd = child + 2 + static_cast<std::uint32_t>(d < c);
+        const double of_ab = std::min(a, b), of_cd = std::min(c, d);
+        if ((a == b) | (c == d) | (of_ab == of_cd)) [[unlikely]] {
+            return first_of(child, child + 4);
+        }
+        return of_cd < of_ab ? cd : ab;
+    }
+    [[nodiscard]] std::uint32_t first_of(std::uint32_t child, std::uint32_t last) const noexcept
+    {
+        std::uint32_t best = child;
+        for (std::uint32_t c = child + 1; c < last; ++c) {
+            if (precedes(heap_[c], heap_[best])) best = c;
+        }
+        return best;
+    }
     void put(std::uint32_t at, const Entry& entry)
     {
         heap_[at] = entry;
@@ -223,11 +245,8 @@ private:
         for (;;) {
             const std::uint32_t child = 4 * at + 1;
             if (child >= size) break;
-            std::uint32_t best = child;
-            const std::uint32_t last = std::min(child + 4, size);
-            for (std::uint32_t c = child + 1; c < last; ++c) {
-                if (precedes(heap_[c], heap_[best])) best = c;
-            }
+            const std::uint32_t best =
+                child + 4 <= size ? first_of_four(child) : first_of(child, size);
             if (!precedes(heap_[best], entry)) break;
             put(at, heap_[best]);
             at = best;

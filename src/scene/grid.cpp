@@ -189,8 +189,34 @@ void Grid::size(World& world, std::span<const std::uint32_t> members, bool steps
     const std::uint32_t least = some_big ? power_above(rings_.across(cells_, box.largest)) : 4;
     cells_.size(side, std::max(buckets(box.extent[0] / side, box.count), least),
                 std::max(buckets(box.extent[1] / side, box.count), least));
-    place_faces(world, 1.001 * small.largest + 0.15 * side, cells_);
+    const double reach = 1.001 * small.largest + 0.15 * side;
+    place_faces(world, reach, cells_);
+    find_cells_away(world, reach);
     if (some_big) size_big(world, members, box);
+}
+
+void Grid::find_cells_away(const World& world, double reach)
+{
+    constexpr std::int64_t far = std::int64_t{1} << 52;  // cells beyond count as near a wall
+    away_ = {{-far, -far}, {far, far}};
+    for (std::uint32_t f = 0; f < world.wall_count; ++f) {
+        const Face& wall = world.faces[f];
+        const std::size_t along = wall.normal[0] != 0 ? 0 : 1;
+        const bool slanted = wall.normal[1 - along] != 0;
+        const bool from_below = wall.normal[along] > 0;
+        const double edge = (wall.at[along] + (from_below ? reach : -reach)) / cells_.side();
+        if (slanted || !(std::fabs(edge) < static_cast<double>(far))) {
+            away_ = {{0, 0}, {-1, -1}};
+            return;
+        }
+        std::int64_t& low = along == 0 ? away_.low.x : away_.low.y;
+        std::int64_t& high = along == 0 ? away_.high.x : away_.high.y;
+        if (from_below) {
+            low = std::max(low, static_cast<std::int64_t>(std::ceil(edge)));
+        } else {
+            high = std::min(high, static_cast<std::int64_t>(std::floor(edge)) - 1);
+        }
+    }
 }
 
 /// Sizes the second grid: a body may lie farther from its cell by the play of its ring.

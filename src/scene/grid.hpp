@@ -97,6 +97,13 @@ public:
         if (!rings_.empty()) rings_.each_on(bodies[i].bucket, visit);
     }
 
+    /// Whether no body of ordinary size in this cell can touch a wall. Always false where a wall is
+    /// not along an axis.
+    [[nodiscard]] bool is_away_from_walls(const Cells::Cell& cell) const noexcept
+    {
+        const auto& [low, high] = away_;
+        return (cell.x >= low.x) & (cell.x <= high.x) & (cell.y >= low.y) & (cell.y <= high.y);
+    }
     [[nodiscard]] bool any_faces() const noexcept { return cells_.any_faces(); }
     /// The faces that a body can touch.
     [[nodiscard]] const std::vector<std::uint32_t>& faces(const Body& body) const noexcept
@@ -115,8 +122,13 @@ public:
 
 private:
     void size_big(const World& world, std::span<const std::uint32_t> members, const Box& box);
+    void find_cells_away(const World& world, double reach);
 
+    struct Range {
+        Cells::Cell low, high;  ///< both included
+    };
     Cells cells_;
+    Range away_;  ///< cells from which no wall can be touched
     Cells big_cells_;
     Rings rings_;
     std::vector<std::uint32_t> ring_of_;  ///< of each body, where there are big ones

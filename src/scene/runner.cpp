@@ -210,6 +210,7 @@ void Runner::consider_walls(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
     if (body.contact != none) return;  // its group meets them
+    if (is_away_from_walls(i)) return;
     const double rounding = World::rounding(body.p, body.radius);
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) {
         const Face& wall = world_.faces[f];
@@ -328,25 +329,30 @@ void Runner::predict_crossing(std::uint32_t i)
         if (first < path.until) pending.crossing = now_.after(first);
         return;
     }
-    double first = never;
     const double since = seconds(body.t, now_);
     const Vector2 p = place(body, since);
     const Vector2 velocity = speed(body, since);
+    Vector2 after{never, never};
+    std::array<std::int8_t, 2> way{};
     for (std::size_t c = 0; c < 2; ++c) {
         const double into = p[c] - corner[c];
         const double v = velocity[c];
         const double a = body.a[c];
-        if (v == 0 && a == 0) continue;
+        if (a == 0) {  // as below, by values: the sign of the velocity cannot be predicted
+            way[c] = v < 0 ? -1 : 1;
+            const double gap = std::max(v < 0 ? into : side - into, 0.0);
+            after[c] = v != 0 ? gap / std::fabs(v) : never;
+            continue;
+        }
         const double down = v > 0 && a >= 0 ? never : falls_after(into, v, a, 0);
         const double up = v < 0 && a <= 0 ? never : falls_after(side - into, -v, -a, 0);
-        const double s = std::min(down, up);
-        if (s < first) {
-            first = s;
-            pending.across_x = pending.across_y = 0;
-            (c == 0 ? pending.across_x : pending.across_y) =
-                static_cast<std::int8_t>(down <= up ? -1 : 1);
-        }
+        after[c] = std::min(down, up);
+        way[c] = down <= up ? -1 : 1;
     }
+    const bool vertical = after[1] < after[0];
+    pending.across_x = vertical ? std::int8_t{0} : way[0];
+    pending.across_y = vertical ? way[1] : std::int8_t{0};
+    const double first = vertical ? after[1] : after[0];
     if (first < never) pending.crossing = now_.after(first);
 }
 
@@ -388,7 +394,9 @@ void Runner::cross(std::uint32_t i)
     }
     const auto x = static_cast<int>(pending.across_x);
     const auto y = static_cast<int>(pending.across_y);
+    const bool was_away = is_away_from_walls(i);
     grid_.step(world_.bodies, i, pending.cell, x, y);
+    if (was_away) consider_walls(i);
     consider_faces(i);
     grid_.each_ahead(world_.bodies, i, pending.cell, x, y,
                      [&](std::uint32_t j) { consider_body(i, j); });

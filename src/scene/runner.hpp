@@ -91,6 +91,12 @@ private:
         if (meeting.after < never) keep_if_first(i, meeting, surface, other);
     }
     void keep_if_first(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other);
+    /// Whether a body cannot touch a wall before it leaves its cell.
+    [[nodiscard]] bool is_away_from_walls(std::uint32_t i) const
+    {
+        const Body& body = world_.bodies[i];
+        return celled_ && !body.big && !body.quartic && grid_.is_away_from_walls(pending_[i].cell);
+    }
     void consider_walls(std::uint32_t i);
     void consider_body(std::uint32_t i, std::uint32_t j);
     void consider_faces(std::uint32_t i);

@@ -152,7 +152,9 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         if (f != sure && !(at.gap <= tolerance && at.gap >= -1e3 * tolerance)) return;
         touch(f, at.normal);
     };
-    for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
+    if (!is_away_from_walls(i)) {
+        for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
+    }
     cluster_.sides.push_back(sides_of(i, sure));
     for (const Side& side : cluster_.sides.back()) {
         const Face& face = world_.faces[side.face];

@@ -144,6 +144,9 @@ std::vector<Key> keys_in_order(const std::vector<SceneEvent>& events)
     return keys;
 }
 
+/// Events whose records are fetched while those before them are copied.
+constexpr std::size_t ahead = 16;
+
 /// Sorts the events of all groups by time; events of one group at one time keep their order.
 void sort_events(SceneRun& run)
 {
@@ -160,8 +163,9 @@ void sort_events(SceneRun& run)
     const std::vector<Key> keys = keys_in_order(run.events);
     std::vector<SceneEvent> sorted;
     reserve_large(sorted, run.events.size());
-    for (const Key& key : keys) {
-        sorted.push_back(run.events[key.index]);
+    for (std::size_t k = 0; k < keys.size(); ++k) {
+        if (k + ahead < keys.size()) fetch_record(run.events[keys[k + ahead].index]);
+        sorted.push_back(run.events[keys[k].index]);
         count(sorted.back());
     }
     run.events = std::move(sorted);

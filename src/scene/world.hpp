@@ -301,11 +301,15 @@ struct Squares {
     const Vector2 pa = place(a, sa);
     const Vector2 dp = pa - place(b, sb);
     const double rate = dot(dp, dv);
-    if (rate >= 0) return {};
     const double square = dot(dp, dp) - reach * reach;
-    if (square > 1e-6 * reach * reach) {
+    const bool far = square > 1e-6 * reach * reach;
+    const double passing = dp[0] * dv[1] - dp[1] * dv[0];
+    const double discriminant = dot(dv, dv) * (reach * reach) - passing * passing;
+    // One branch for most pairs: whether they approach cannot be predicted.
+    if ((rate >= 0) | (far & (discriminant < 0))) return {};
+    if (far) {
         // Far from touching the sum of squares keeps its digits.
-        return {.from = from, .after = straight({square, rate, 0}, dp, dv, reach)};
+        return {.from = from, .after = square / (std::sqrt(discriminant) - rate)};
     }
     const Squares now = squares(dp, dv, reach, 0);
     if (now.at_once <= 4 * reach * World::rounding(pa, reach) && -rate <= noise(va, vb) * reach) {
