@@ -66,6 +66,10 @@ public:
     {
         return (c_[1] + x * (2 * c_[2] + x * (3 * c_[3] + x * (4 * c_[4] + x * 5 * c_[5])))) / h_;
     }
+    [[nodiscard]] double acceleration(double x) const
+    {
+        return (2 * c_[2] + x * (6 * c_[3] + x * (12 * c_[4] + x * 20 * c_[5]))) / (h_ * h_);
+    }
 
     /// Time at which a motion with the sign `sign` that has reversed at 1 stops.
     [[nodiscard]] double arrest(double sign) const
@@ -106,6 +110,7 @@ public:
         for (auto& k : v_stage_) k.setZero(n);
         for (auto& k : a_stage_) k.setZero(n);
         stop_.setConstant(n, 2);
+        back_.setZero(n);
         sign_.setZero(n);
         sign1_.setZero(n);
     }
@@ -237,10 +242,16 @@ private:
         for (Index i = 0; i < fault_.size(); ++i) {
             sign1_[i] = sign_[i];
             if (sign_[i] == 0 || sign_[i] * v1_[i] > 0) continue;
-            stop_[i] = path_of(i, h).arrest(sign_[i]);
+            const ElementPath path = path_of(i, h);
+            stop_[i] = path.arrest(sign_[i]);
             sign1_[i] = 0;
             stopped = true;
             ++out_.statistics.arrests;
+            back_[i] = acceleration_back(i, path);
+            if (back_[i] != 0) {
+                sign1_[i] = -sign_[i];
+                ++out_.statistics.restarts;
+            }
             last_stop_ = std::max(last_stop_, t_ + stop_[i] * h);
         }
         ++out_.statistics.steps;
@@ -263,7 +274,18 @@ private:
         return {h, now_.slip[i], now_.velocity[i], acceleration_[i], d1_[i], v1_[i], a1_[i]};
     }
 
-    /// Fields between the step's start, now_, and its end, d1_, v1_, a1_, with every arrest.
+    /// Acceleration of an element that turns back where it stops, by the friction of the other
+    /// direction; 0 if it stays at rest.
+    [[nodiscard]] double acceleration_back(Index i, const ElementPath& path) const
+    {
+        const double slipped = sign_[i] * (path.slip(stop_[i]) - now_.slip[i]);
+        const double strength = fault_.strength(i, now_.path[i] + slipped);
+        const double back = path.acceleration(stop_[i]) + 2 * sign_[i] * strength;
+        return sign_[i] * back < 0 ? back : 0;
+    }
+
+    /// Fields between the step's start, now_, and its end, d1_, v1_, a1_, with every arrest. An
+    /// element that turns back is accelerated evenly to the end, which keeps the order of arrests.
     void fields_at(double theta, double h, FaultFields& out) const
     {
         out = now_;
@@ -276,6 +298,11 @@ private:
             out.slip[i] = end ? d1_[i] : path.slip(at);
             out.velocity[i] = stopped ? 0 : end ? v1_[i] : path.velocity(at);
             out.path[i] += sign_[i] * (out.slip[i] - now_.slip[i]);
+            if (!stopped || back_[i] == 0) continue;
+            out.velocity[i] = back_[i] * (theta - at) * h;
+            const double turned = 0.5 * out.velocity[i] * (theta - at) * h;
+            out.slip[i] += turned;
+            out.path[i] += std::abs(turned);
         }
     }
 
@@ -287,7 +314,13 @@ private:
             if (sign_[i] == 0) continue;
             const ElementPath path = path_of(i, h);
             sum.slip += sign_[i] * (path.slip(std::min(theta, stop_[i])) - now_.slip[i]);
-            if (theta < stop_[i]) sum.velocity += path.velocity(theta);
+            if (theta < stop_[i]) {
+                sum.velocity += path.velocity(theta);
+            } else if (back_[i] != 0) {
+                const double velocity = back_[i] * (theta - stop_[i]) * h;
+                sum.velocity += velocity;
+                sum.slip += 0.5 * std::abs(velocity) * (theta - stop_[i]) * h;
+            }
         }
         return {.slip = fault_.share() * sum.slip, .velocity = fault_.share() * sum.velocity};
     }
@@ -321,6 +354,7 @@ private:
     std::array<VectorXd, stages> v_stage_, a_stage_;
     VectorXd d_, v_, d1_, v1_, a1_;
     VectorXd stop_;          // fraction of the step after which an element stopped; 2: it did not
+    VectorXd back_;          // acceleration of an element that turned back there; 0: it did not
     VectorXd sign_, sign1_;  // of the motion; 0: at rest
 };
 

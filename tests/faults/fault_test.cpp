@@ -292,6 +292,40 @@ TEST(Rupture, OneElementHasTheKnownSlipArrestAndPeak)
     EXPECT_EQ(r.statistics.arrests, 1U);
 }
 
+TEST(Rupture, AnElementThatTurnsBackKeepsTheOrderOfArrests)
+{
+    // Undamped and with hardly any weakening, one element makes half turns of a spring about the
+    // friction of their direction: b (5 + 3 + 1) twice, in the time 3 pi, from an overload of 5.
+    const StrikeSlipFault fault(
+        {.damping = 0, .residual_friction = 0.5, .friction_drop = 1e-12, .overload = 5});
+    const double b = fault.strength(0, 0);
+    const double pi = std::numbers::pi;
+    const auto rupture = [&](double step) {
+        const double unit = fault.time_unit();
+        return simulate(fault, {.t_end = 20 * unit,
+                                .step = step * unit,
+                                .rtol = std::numeric_limits<double>::infinity(),
+                                .snapshot_times = {1.3 * pi * unit, 1.7 * pi * unit}});
+    };
+    for (const double step : {0.2, 0.1, 0.05}) {
+        const Rupture r = rupture(step);
+        EXPECT_EQ(r.outcome, Outcome::at_rest);
+        EXPECT_EQ(r.statistics.arrests, 3U);
+        EXPECT_EQ(r.statistics.restarts, 2U);
+        const double allowed = 0.05 * step * step;
+        EXPECT_NEAR(r.mean_slip / (18 * b * fault.slip_unit()), 1, allowed) << step;
+        EXPECT_NEAR(r.rest_time / (3 * pi * fault.time_unit()), 1, allowed) << step;
+        ASSERT_EQ(r.snapshots.size(), 2U);
+        for (const RuptureSnapshot& s : r.snapshots) {
+            const double turned = s.t / fault.time_unit() - pi;
+            const double slip = b * (10 + 3 * (1 - std::cos(turned)));
+            const double velocity = -3 * b * std::sin(turned);
+            EXPECT_NEAR(s.slip[0] / fault.slip_unit(), slip, allowed * 10 * b) << step;
+            EXPECT_NEAR(s.velocity[0] / fault.velocity_unit(), velocity, allowed * 10 * b) << step;
+        }
+    }
+}
+
 TEST(Rupture, PublishedKernelsGiveTheirConvergedSlip)
 {
     // Limits of steps going to zero: 237.0438 and 825.2032 mm.
