@@ -414,6 +414,16 @@ TEST(Rupture, StabilityOfTheMethodIsKnown)
     // Dormand and Prince's interval on the negative axis ends at 3.31; at 0.8/3 near 3.15.
     EXPECT_NEAR(stable_step_of_mode(1), 3.31, 0.01);
     EXPECT_NEAR(stable_step_of_mode(0.8 / 3), 3.15, 0.02);
+    // Strong damping has one fast mode, of rate -2 zeta.
+    for (const double damping : {30.0, 2e3, 1e6, 1e200}) {
+        EXPECT_NEAR(2 * damping * stable_step_of_mode(damping), 3.31, 0.01) << damping;
+    }
+    // At a damping of 2e3 an element creeps at (1 + overload) b - b(s) - d - 4e3 v = 0.
+    const StrikeSlipFault fault({.damping = 2e3, .friction_drop = 1e-12, .overload = 1});
+    const Rupture r = simulate(fault, {.t_end = 100 * fault.time_unit()});
+    EXPECT_EQ(r.outcome, Outcome::reached_end);
+    const double creep = -std::expm1(-100 / 4e3);
+    EXPECT_NEAR(r.mean_slip / (fault.strength(0, 0) * fault.slip_unit()) / creep, 1, 1e-5);
 }
 
 Rupture bathe(const StrikeSlipFault& fault, double step, const BatheOptions& options = {})
