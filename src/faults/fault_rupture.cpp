@@ -132,11 +132,15 @@ public:
             const double left = end - t_;
             const double step = left <= h * (1 + 1e-9) ? left : left < 2 * h ? 0.5 * left : h;
             const double error = attempt(step);
-            if (!std::isfinite(error)) return finish(Outcome::non_finite);
-            h = std::min(longest_, step * growth(error));
-            if (error > 1) {
+            const bool finite = std::isfinite(error);
+            // Stages of a step that is too long may overflow where the motion does not.
+            if (!finite && !std::isfinite(options_.rtol)) return finish(Outcome::non_finite);
+            h = std::min(longest_, step * (finite ? growth(error) : 0.2));
+            if (!finite || error > 1) {
                 ++out_.statistics.rejected;
-                if (h < 1e-12 * end) return finish(Outcome::step_underflow);
+                if (h < 1e-12 * end) {
+                    return finish(finite ? Outcome::step_underflow : Outcome::non_finite);
+                }
                 continue;
             }
             accept(step, step == left ? end : t_ + step);

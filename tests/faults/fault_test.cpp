@@ -426,6 +426,17 @@ TEST(Rupture, StabilityOfTheMethodIsKnown)
     EXPECT_NEAR(r.mean_slip / (fault.strength(0, 0) * fault.slip_unit()) / creep, 1, 1e-5);
 }
 
+TEST(Rupture, FrictionThatFallsWithinMicrometresTakesShorterSteps)
+{
+    // The peak is that of friction without its drop, after an onset that needs short steps.
+    for (const double distance : {1e-7, 1e-8, 1e-10}) {
+        const Rupture r =
+            simulate(StrikeSlipFault({.slip_distance = distance, .overload = 1e-2}), {.t_end = 30});
+        EXPECT_EQ(r.outcome, Outcome::at_rest) << distance;
+        EXPECT_NEAR(r.arrest_time, 2.8229, 0.02) << distance;
+    }
+}
+
 Rupture bathe(const StrikeSlipFault& fault, double step, const BatheOptions& options = {})
 {
     return simulate(fault, {.t_end = 30, .step = step, .polynomial_bound = 1e-7}, options);
