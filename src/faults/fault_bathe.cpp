@@ -155,7 +155,6 @@ private:
             stage_.start = n.velocity + stage_.g * from.acceleration;
         } else {
             forces_.drive(n.slip, n.velocity, stage_.start);
-            for (Index i = 0; i < fault_.size(); ++i) stage_.start[i] += forces_.first_strength(i);
             stage_.start = n.velocity + stage_.g * stage_.start;
         }
         stage_.slip = n.slip + stage_.g * n.velocity;
@@ -330,8 +329,9 @@ private:
     {
         forces_.drive(now_.fields.slip, now_.fields.velocity, error_.slip);
         for (Index i = 0; i < fault_.size(); ++i) {
-            const double drive = error_.slip[i] + forces_.first_strength(i);
-            if (std::abs(drive) > fault_.strength(i, now_.fields.path[i])) return false;
+            const double path = now_.fields.path[i];
+            const double forward = error_.slip[i] + fault_.weakening(i, path);
+            if (forward > 0 || forward + 2 * fault_.strength(i, path) < 0) return false;
         }
         return true;
     }

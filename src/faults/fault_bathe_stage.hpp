@@ -13,7 +13,8 @@ namespace ricochet::detail {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// One stage: v = start + g (c0 - K d - H v) - friction b(s) Sign(v), d and s as above.
+/// One stage, where v > 0: v = start + g (overload b(0) - K d - H v) + friction (b(0) - b(s)), d and
+/// s as above. Written with b(0) and b(s) apart, it would lose a small overload to rounding.
 struct StageOfFault {
     double g = 0;
     double friction = 0;
@@ -70,20 +71,22 @@ private:
             a_.combine(forces_.root_of_stiffness(), 1, g_ * g_, damping * g_);
         }
         forces_.product()(stage.slip, rhs_);
-        const double start = 1 + fault_.parameters().overload;
+        const double overload = fault_.parameters().overload;
         for (Index i = 0; i < rhs_.size(); ++i) {
-            rhs_[i] = stage.start[i] + stage.g * (start * forces_.first_strength(i) - rhs_[i]);
+            rhs_[i] = stage.start[i] + stage.g * (overload * forces_.first_strength(i) - rhs_[i]);
         }
         settled_ = false;
     }
 
     void multiply(const VectorXd& x, VectorXd& y) { a_.apply(forces_.product(), x, y, scratch_); }
 
-    [[nodiscard]] double bound(const StageOfFault& stage, Index i, double v) const
+    /// What friction adds to the right-hand side of an element that slips in the direction `sign`.
+    [[nodiscard]] double friction(const StageOfFault& stage, Index i, double v, double sign) const
     {
         const bool implicit = options_.bound == FaultBound::implicit;
         const double path = implicit ? stage.path[i] + stage.g * std::abs(v) : stage.at_path[i];
-        return stage.friction * fault_.strength(i, path);
+        const double forward = fault_.weakening(i, path);
+        return stage.friction * (sign > 0 ? forward : forward + 2 * fault_.strength(i, path));
     }
 
     /// Direction in which each element slips, by the proximal map at v; elements that stick are
@@ -93,9 +96,10 @@ private:
         bool stopped = false;
         settled_ = true;
         for (Index i = 0; i < v.size(); ++i) {
-            const double limit = bound(stage, i, v[i]);
             const double z = rhs_[i] - q_[i] + v[i];
-            const double sign = z > limit ? 1 : z < -limit ? -1 : 0;
+            const double sign = z + friction(stage, i, v[i], 1) > 0    ? 1
+                                : z + friction(stage, i, v[i], -1) < 0 ? -1
+                                                                       : 0;
             if (sign != sign_[i]) settled_ = false;
             sign_[i] = sign;
             if (sign == 0 && v[i] != 0) {
@@ -115,7 +119,7 @@ private:
         for (Index i = 0; i < v.size(); ++i) {
             residual_[i] = softening_[i] = 0;
             if (sign_[i] == 0) continue;
-            residual_[i] = rhs_[i] - sign_[i] * bound(stage, i, v[i]) - q_[i];
+            residual_[i] = rhs_[i] + friction(stage, i, v[i], sign_[i]) - q_[i];
             // A velocity against its own sign has no bound of its own: the bound at rest is used.
             if (implicit && sign_[i] * v[i] >= 0) {
                 softening_[i] = stage.friction * stage.g * fault_.weight()[i] * drop *

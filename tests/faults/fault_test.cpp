@@ -517,6 +517,27 @@ TEST(FaultBathe, StepsBeyondConvexityAreReportedOrShortened)
     EXPECT_EQ(extrapolated.statistics.rejected, 0U);
 }
 
+TEST(FaultBathe, AnOverloadBelowRoundingStillRuptures)
+{
+    // The onset grows from any overload: the slip is the same, only later, as with explicit steps.
+    for (const double overload : {1e-16, 1e-17, 1e-40}) {
+        const StrikeSlipFault fault({.overload = overload});
+        const double peak = simulate(fault, {.t_end = 150}).peak_time;
+        for (const FirstStage first : {FirstStage::averaged, FirstStage::at_end}) {
+            const Rupture r =
+                simulate(fault, {.t_end = 150, .step = 0.02}, {.first_stage = first});
+            EXPECT_EQ(r.outcome, Outcome::at_rest) << overload;
+            EXPECT_NEAR(r.mean_slip, 0.22797, 1e-3) << overload;
+            EXPECT_NEAR(r.peak_time / peak, 1, 5e-3) << overload;
+        }
+        const Rupture controlled = simulate(
+            fault, {.t_end = 150, .step = 0.02},
+            {.controller = ErrorStep{}, .estimate = ErrorEstimate::embedded, .rtol = 1e-4});
+        EXPECT_EQ(controlled.outcome, Outcome::at_rest) << overload;
+        EXPECT_NEAR(controlled.mean_slip, 0.22797, 1e-4) << overload;
+    }
+}
+
 TEST(FaultBathe, RefusesWrongOptions)
 {
     const StrikeSlipFault fault;
