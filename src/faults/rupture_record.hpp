@@ -83,7 +83,9 @@ public:
     void finish(double t, double rest_time, bool located, const FaultFields& fields)
     {
         const bool rests = !std::isnan(rest_time);
-        out_.t = rests ? options_.t_end : seconds(t);
+        // The end in seconds may differ by rounding from the end of the last step.
+        const bool over = rests || t == options_.t_end / fault_.time_unit();
+        out_.t = over ? options_.t_end : seconds(t);
         out_.slip = fields.path * fault_.slip_unit();
         out_.velocity = fields.velocity * fault_.velocity_unit();
         out_.mean_slip = fault_.mean(out_.slip);
@@ -94,7 +96,7 @@ public:
             out_.mean_slips.push_back(out_.mean_slip);
             out_.mean_velocities.push_back(0.0);
         }
-        while (rests && next_ < options_.snapshot_times.size()) {
+        while (over && next_ < options_.snapshot_times.size()) {
             snapshot(options_.snapshot_times[next_++], fields);
         }
     }

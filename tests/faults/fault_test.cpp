@@ -382,6 +382,22 @@ TEST(Rupture, EndsWhereItIsToldAndKeepsSnapshots)
     EXPECT_LT(cancelled.t, 2);
 }
 
+TEST(Rupture, HasTheSnapshotOfItsEndForAnyUnitOfTime)
+{
+    for (int i = 0; i < 50; ++i) {
+        const StrikeSlipFault fault({.side = 1000 + 37.3 * i});
+        const double end = 1 + 0.1 * i;
+        const RuptureOptions options{.t_end = end, .step = 0.2, .snapshot_times = {end}};
+        const RateStateRupture slow = simulate(fault, options, FaultFriction{}, {});
+        for (const Rupture& r : {simulate(fault, options), simulate(fault, options, BatheOptions{}),
+                                 slow.rupture}) {
+            EXPECT_EQ(r.t, end) << i;
+            ASSERT_EQ(r.snapshots.size(), 1U) << i;
+            EXPECT_NEAR(r.snapshots[0].slip[0] / r.slip[0], 1, 1e-12) << i;
+        }
+    }
+}
+
 TEST(Rupture, IsSymmetricAlongTheStrike)
 {
     const Rupture r = simulate(StrikeSlipFault({.elements = 6}), {.t_end = 30});
