@@ -138,7 +138,7 @@ public:
             h = std::min(longest_, step * (finite ? growth(error) : 0.2));
             if (!finite || error > 1) {
                 ++out_.statistics.rejected;
-                if (h < 1e-12 * end) {
+                if (h < 1e-12 * std::max(t_, std::min(1.0, end))) {
                     return finish(finite ? Outcome::step_underflow : Outcome::non_finite);
                 }
                 continue;

@@ -326,6 +326,18 @@ TEST(Rupture, AnElementThatTurnsBackKeepsTheOrderOfArrests)
     }
 }
 
+TEST(Rupture, EndsAtRestHoweverLateItsEnd)
+{
+    // The shortest step is relative to the time reached, and not to the end of the run.
+    const StrikeSlipFault fault({.slip_distance = 1e-6});
+    const Rupture early = simulate(fault, {.t_end = 30});
+    const Rupture late = simulate(fault, {.t_end = 1e14});
+    EXPECT_GT(early.statistics.rejected, 0U);
+    EXPECT_EQ(late.outcome, Outcome::at_rest);
+    EXPECT_EQ(late.mean_slip, early.mean_slip);
+    EXPECT_EQ(late.rest_time, early.rest_time);
+}
+
 TEST(Rupture, PublishedKernelsGiveTheirConvergedSlip)
 {
     // Limits of steps going to zero: 237.0438 and 825.2032 mm.
