@@ -13,8 +13,8 @@ namespace ricochet::detail {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-/// One stage, where v > 0: v = start + g (overload b(0) - K d - H v) + friction (b(0) - b(s)), d and
-/// s as above. Written with b(0) and b(s) apart, it would lose a small overload to rounding.
+/// One stage, where v > 0: v = start + g (overload b(0) - K d - H v) + friction (b(0) - b(s)), d
+/// and s as above. Written with b(0) and b(s) apart, it would lose a small overload to rounding.
 struct StageOfFault {
     double g = 0;
     double friction = 0;

@@ -393,8 +393,7 @@ double stable_step_of_mode(double damping)
 {
     using Complex = std::complex<double>;
     // The square of a damping above 1e8 may overflow, and the 1 is below its rounding.
-    const Complex root =
-        damping > 1e8 ? damping : std::sqrt(Complex(damping * damping - 1, 0));
+    const Complex root = damping > 1e8 ? damping : std::sqrt(Complex(damping * damping - 1, 0));
     const double step = 1e-3 / std::max(1.0, damping);
     for (double h = step;; h += step) {
         for (const Complex z : {h * (-damping + root), h * (-damping - root)}) {

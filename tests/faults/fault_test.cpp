@@ -401,8 +401,8 @@ TEST(Rupture, HasTheSnapshotOfItsEndForAnyUnitOfTime)
         const double end = 1 + 0.1 * i;
         const RuptureOptions options{.t_end = end, .step = 0.2, .snapshot_times = {end}};
         const RateStateRupture slow = simulate(fault, options, FaultFriction{}, {});
-        for (const Rupture& r : {simulate(fault, options), simulate(fault, options, BatheOptions{}),
-                                 slow.rupture}) {
+        for (const Rupture& r :
+             {simulate(fault, options), simulate(fault, options, BatheOptions{}), slow.rupture}) {
             EXPECT_EQ(r.t, end) << i;
             ASSERT_EQ(r.snapshots.size(), 1U) << i;
             EXPECT_NEAR(r.snapshots[0].slip[0] / r.slip[0], 1, 1e-12) << i;
@@ -552,8 +552,7 @@ TEST(FaultBathe, AnOverloadBelowRoundingStillRuptures)
         const StrikeSlipFault fault({.overload = overload});
         const double peak = simulate(fault, {.t_end = 150}).peak_time;
         for (const FirstStage first : {FirstStage::averaged, FirstStage::at_end}) {
-            const Rupture r =
-                simulate(fault, {.t_end = 150, .step = 0.02}, {.first_stage = first});
+            const Rupture r = simulate(fault, {.t_end = 150, .step = 0.02}, {.first_stage = first});
             EXPECT_EQ(r.outcome, Outcome::at_rest) << overload;
             EXPECT_NEAR(r.mean_slip, 0.22797, 1e-3) << overload;
             EXPECT_NEAR(r.peak_time / peak, 1, 5e-3) << overload;
