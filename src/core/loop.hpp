@@ -499,6 +499,13 @@ private:
     template <class Visitor>
     void visit_state(Visitor&& visit);
 
+    /// What ended the run, if it has ended.
+    template <class Visitor>
+    void visit_cause(Visitor&& visit);
+    /// Lets a run continue that ended because it was cancelled, or at an end before that of the
+    /// options.
+    void reopen() noexcept;
+
     /// The next sample is the first that is neither in the past nor already written.
     template <class Visitor>
     void visit_samples(Visitor&& visit);

@@ -24,6 +24,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
         SnapshotReader reader(snapshot);
         visit_state(reader);
         reader.finish();
+        reopen();
         refuse_bad_place();
     } catch (const std::invalid_argument&) {
         visit_state(SnapshotReader(old));
@@ -31,9 +32,6 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
     }
     step_.restart(place_);
     next_review_ = 0;
-    // What is left of the run that this simulation was in.
-    run_.guard = run_.other_guard = no_guard;
-    run_.wrong_bound.reset();
     watching_ = false;
     show_all();
     if (guarded_) search_.begin(step_.x0());
@@ -57,6 +55,7 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
     visit(resting_);
     visit(ended_);
     visit(run_.outcome);
+    visit_cause(visit);
     visit_samples(visit);
     this->visit_guards(visit);
     if (defers_) {
@@ -64,6 +63,42 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
         visit(newly_armed_);
         planner_->visit(visit);
     }
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::reopen() noexcept
+{
+    const bool short_of_end = lies_before(place_.t.value, options_.t_end);
+    if (run_.outcome == Outcome::cancelled ||
+        (run_.outcome == Outcome::reached_end && short_of_end)) {
+        ended_ = false;
+        run_.outcome = Outcome::reached_end;
+    }
+}
+
+template <class X, bool single>
+template <class Visitor>
+inline void Loop<X, single>::visit_cause(Visitor&& visit)
+{
+    constexpr bool saves = std::remove_cvref_t<Visitor>::saves;
+    if constexpr (!saves) {
+        run_.guard = run_.other_guard = no_guard;
+        run_.wrong_bound.reset();
+    }
+    if (!ended_) return;
+    visit(run_.guard);
+    visit(run_.other_guard);
+    if (run_.outcome != Outcome::wrong_bound) return;
+    if constexpr (!saves) run_.wrong_bound.emplace().x = place_.x;
+    WrongBound<X>& wrong = *run_.wrong_bound;
+    visit(wrong.guard);
+    visit(wrong.lower_bound);
+    visit(wrong.upper_bound);
+    for (double* number :
+         {&wrong.t, &wrong.value, &wrong.since, &wrong.value_then, &wrong.allowed}) {
+        visit(*number);
+    }
+    visit.state(wrong.x);
 }
 
 template <class X, bool single>

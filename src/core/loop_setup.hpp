@@ -69,6 +69,11 @@ inline void Loop<X, single>::refuse_bad_place() const
     require(ended_ || lies_before(place_.t.value, time_event_) || !timed_, "the next time event");
     const std::size_t modes = this->modes();
     require(modes == 0 || place_.mode < modes, "the mode");
+    const auto is_guard = [this](std::size_t i) { return i == no_guard || i < bank_.size(); };
+    require(is_guard(run_.guard) &&
+                (is_guard(run_.other_guard) || run_.other_guard == time_event_reset) &&
+                (!run_.wrong_bound || is_guard(run_.wrong_bound->guard)),
+            "the guard that ended the run");
 }
 
 }  // namespace ricochet::detail

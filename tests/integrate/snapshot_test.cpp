@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -14,6 +16,7 @@
 #include <vector>
 
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/locators.hpp"
 #include "saved_systems.hpp"
@@ -176,6 +179,111 @@ TEST(Snapshot, SampleTimesAreThoseOfTheRunThatGoesOn)
     const auto run = other.take();
     EXPECT_EQ(run.trajectory.t, (std::vector<double>{1.5, 3}));
     EXPECT_EQ(run.trajectory.x.back(), whole.take().trajectory.x.back());
+}
+
+/// A ball between two floors whose resets contradict each other.
+struct Contradiction {
+    using State = X;
+    static constexpr std::size_t guard_count = 3;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
+    double guard(std::size_t which, double, const X& x) const { return which == 0 ? 9 : x[0]; }
+    void reset(std::size_t which, double, X& x) const { x[1] = which == 1 ? 1 : 2; }
+};
+
+/// A ball that claims to be slow.
+struct Slow {
+    using State = X;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
+    double guard(double, const X& x) const { return x[0]; }
+    void reset(double, X& x) const { x = {0, -x[1]}; }
+    double speed_bound(double, const X&) const { return 0.1; }
+};
+
+TEST(Snapshot, ARunThatHasReachedItsEndGoesOnToALaterOne)
+{
+    const Ball ball;
+    const auto whole = integrate(ball, X{1, 0}, options, FixedStep<Rk4>{});
+    using Fixed = Simulation<Ball, X, FixedStep<Rk4>>;
+    Options early = options;
+    for (const double end : {0.5, 2.0, 3.99}) {
+        early.t_end = end;
+        Fixed first(ball, X{1, 0}, early);
+        while (first.step()) {
+        }
+        const Snapshot saved = first.save();
+        Fixed same(ball, X{1, 0}, early);
+        same.restore(saved);
+        EXPECT_TRUE(same.ended());
+        EXPECT_EQ(same.run().outcome, Outcome::reached_end);
+        Fixed later(ball, X{1, 0}, options);
+        later.restore(saved);
+        EXPECT_FALSE(later.ended());
+        const auto run = later.take();
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        EXPECT_EQ(run.t, 4);
+        EXPECT_EQ(first.run().events.size() + run.events.size(), whole.events.size());
+        EXPECT_NEAR(run.x[0], whole.x[0], 1e-12);
+    }
+}
+
+TEST(Snapshot, ARunThatWasCancelledGoesOn)
+{
+    const Ball ball;
+    std::atomic<bool> cancelled = false;
+    Options stopped = options;
+    stopped.cancelled = &cancelled;
+    Simulation<Ball, X> first(ball, X{1, 0}, stopped);
+    for (int i = 0; i < 9; ++i) first.step();
+    cancelled = true;
+    EXPECT_FALSE(first.step());
+    EXPECT_EQ(first.run().outcome, Outcome::cancelled);
+    const double t = first.t();
+    Simulation<Ball, X> second(ball, X{1, 0}, options);
+    second.restore(first.save());
+    EXPECT_FALSE(second.ended());
+    EXPECT_EQ(second.t(), t);
+    const auto run = second.take();
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.x, integrate(ball, X{1, 0}, options).x);
+}
+
+TEST(Snapshot, WhatEndedARunIsKept)
+{
+    const Contradiction contradiction;
+    Simulation<Contradiction, X> first(contradiction, X{1, 0}, options);
+    while (first.step()) {
+    }
+    ASSERT_EQ(first.run().outcome, Outcome::conflicting_resets);
+    Simulation<Contradiction, X> second(contradiction, X{1, 0}, options);
+    second.restore(first.save());
+    EXPECT_TRUE(second.ended());
+    EXPECT_EQ(second.run().outcome, Outcome::conflicting_resets);
+    EXPECT_EQ(second.run().guard, 1U);
+    EXPECT_EQ(second.run().other_guard, 2U);
+    // The guards that contradict each other are the only counts of 1 and 2 in turn.
+    Snapshot bad = first.save();
+    const std::array<std::uint64_t, 2> guards{1, 2};
+    const auto at = std::search(bad.counts.begin(), bad.counts.end(), guards.begin(), guards.end());
+    ASSERT_NE(at, bad.counts.end());
+    *at = 3;
+    EXPECT_NE(refusal([&] { second.restore(bad); }).find("the guard that ended"),
+              std::string::npos);
+
+    const Slow slow;
+    using Planning = Simulation<Slow, X, FixedStep<Rk4>, Planned<>>;
+    Planning third(slow, X{1, 0}, options);
+    while (third.step()) {
+    }
+    ASSERT_EQ(third.run().outcome, Outcome::wrong_bound);
+    Planning fourth(slow, X{1, 0}, options);
+    fourth.restore(third.save());
+    ASSERT_TRUE(fourth.run().wrong_bound);
+    EXPECT_EQ(fourth.run().guard, 0U);
+    EXPECT_EQ(fourth.run().wrong_bound->t, third.run().wrong_bound->t);
+    EXPECT_EQ(fourth.run().wrong_bound->x, third.run().wrong_bound->x);
+    EXPECT_EQ(fourth.run().wrong_bound->allowed, third.run().wrong_bound->allowed);
+    const Snapshot again = fourth.save();
+    EXPECT_EQ(again.counts, third.save().counts);
 }
 
 }  // namespace
