@@ -72,6 +72,7 @@ public:
         ended_ = resting_ = this->stops_ = false;
         run_.outcome = Outcome::reached_end;
         run_.guard = run_.other_guard = no_guard;
+        run_.wrong_bound.reset();
         this->pending_ = Pending::nothing;
         this->level_ = 0;
         search_.fired().clear();
@@ -202,6 +203,8 @@ public:
             throw;
         }
         step_.restart(place_);
+        run_.guard = run_.other_guard = no_guard;
+        run_.wrong_bound.reset();
         this->pending_ = Pending::nothing;
         started_ = true;
         if (guarded_) search_.begin(step_.x0());

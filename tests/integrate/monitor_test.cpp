@@ -698,6 +698,34 @@ TEST(Monitor, ASnapshotGoesOnWithTheSameBits)
     EXPECT_EQ(other.x()[0], host.x()[0]);
 }
 
+/// A fall that ends the run at the floor.
+struct LastFall {
+    using State = X;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
+    double guard(double, const X& x) const { return x[0]; }
+    GuardInfo guard_info() const { return {.stop_after = 1}; }
+};
+
+TEST(Monitor, NothingIsLeftOfTheRunThatHasEnded)
+{
+    const LastFall fall;
+    EventMonitor monitor(fall, X{});
+    Rk4Host<LastFall, 2> host(fall, 0, X{0.005, 0});
+    ASSERT_EQ(monitor.start(Instant{0}, host.x(), host.rate(), 0.2), Verdict::stands);
+    const Snapshot saved = monitor.save();
+    Verdict verdict = monitor.examine(Rk4Host<LastFall, 2>::Step(host, 0.2));
+    if (verdict == Verdict::cut) {
+        host.restart(monitor.cut().t, monitor.cut().after, 0);
+        verdict = monitor.resume(host.rate(), 0.2);
+    }
+    ASSERT_EQ(verdict, Verdict::ended);
+    ASSERT_EQ(monitor.outcome(), Outcome::stopped_by_event);
+    ASSERT_EQ(monitor.guard(), 0U);
+    monitor.restore(saved);
+    EXPECT_EQ(monitor.outcome(), Outcome::reached_end);
+    EXPECT_EQ(monitor.guard(), no_guard);
+}
+
 // --- misuse by a host ---
 
 struct Shown {
