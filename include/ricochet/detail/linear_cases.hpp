@@ -73,7 +73,7 @@ struct RICOCHET_ALIGNED LinearInequality {
     /// each solved by principal pivots (J. J. Judice and F. M. Pires, A block principal pivoting
     /// algorithm for large-scale strictly monotone linear complementarity problems, Computers and
     /// Operations Research 21, 1994). False where pivots or proximal steps do not terminate, which
-    /// can happen where W is indefinite.
+    /// can happen where W is indefinite, or where its rows differ in size by many orders.
     [[nodiscard]] bool solve_by_pivots(Vector& reaction, Vector& y, Branches& branches) const;
 
     /// The solution of the equations of the given branches, whether it lies on them or
@@ -259,17 +259,20 @@ bool LinearInequality<M>::solve_by_pivots(Vector& reaction, Vector& y, Branches&
     strict.w.diagonal() += eps;
     Vector before = y0;
     before.setZero();
-    for (int step = 0; step < 100; ++step) {
+    constexpr int most_steps = 1000;
+    double unsettled = std::numeric_limits<double>::infinity();
+    for (int step = 0; step < most_steps && unsettled > 1e-14; ++step) {
         strict.y0 = y0 - eps.cwiseProduct(before);
         if (!strict.pivot(reaction, y, branches)) return false;
-        bool moves = false;
+        unsettled = 0;
         for (Eigen::Index i = 0; i < y0.size(); ++i) {
+            // The part of y that the step adds, which a solution does not have.
             const double off = eps[i] * std::abs(reaction[i] - before[i]);
-            moves = moves || !(off <= 1e-14 * terms(i, reaction));
+            if (off > 0) unsettled = std::max(unsettled, off / terms(i, reaction));
         }
         before = reaction;
-        if (!moves) break;
     }
+    if (!(unsettled <= 1e-10)) return false;
     y.noalias() = w * reaction;
     y += y0;
     for (Eigen::Index i = 0; i < y0.size(); ++i) {
