@@ -98,7 +98,7 @@ inline bool EventEngine<X, single>::find(bool cleared)
     search_.begin(step_.x0());
     if (bank_.waiting()) end_plateaus();
     bank_.begin_search(step_.h());
-    while (search_.find_set(step_, bank_, resolution_, time_event_due_, calls())) {
+    while (search_.find_set(step_, bank_, time_event_due_, calls())) {
         if (predicts_ && (cleared || search_.late())) ++run_.statistics.missed_events;
         if (search_.late()) ++run_.statistics.late_events;
         dismiss_members();

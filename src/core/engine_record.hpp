@@ -11,7 +11,7 @@ inline void EventEngine<X, single>::note_crossings(double s)
     if (!bank_.suspects().empty()) bank_.complete_rates(step_, calls());
     for (const std::size_t i : bank_.suspects()) {
         if (bank_[i].acting || !bank_.suspicious(i, step_.h())) continue;
-        search_.note_crossings(step_, bank_, i, bank_.end(i, s), resolution_, calls());
+        search_.note_crossings(step_, bank_, i, bank_.end(i, s), calls());
     }
 }
 
@@ -34,16 +34,15 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         }
         const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays there
         const bool may_cross = !record.info.boolean && !rests && at.s > record.from;
-        const bool with_set =
-            may_cross && (search_.crosses_with_set(step_, bank_, i, at, resolution_) ||
-                          is_rounding_at_set(i, at));
+        const bool with_set = may_cross && (search_.crosses_with_set(step_, bank_, i, at) ||
+                                            is_rounding_at_set(i, at));
         GuardSample last = at;
         // Until it crosses, the guard is on the side that it comes from. The time of the set is
         // rounded to a double.
         if (with_set) record.band = rounded;
         if (with_set) last.value = -std::copysign(std::numeric_limits<double>::min(), at.rate);
         if (!record.acting) {
-            search_.note_crossings(step_, bank_, i, last, resolution_, calls());
+            search_.note_crossings(step_, bank_, i, last, calls());
         }
         // An acting guard that has left its side, but was located behind the set, has left it by
         // rounding of its value only: its own event is still to come.

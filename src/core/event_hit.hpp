@@ -88,14 +88,12 @@ struct Finders {
     [[nodiscard]] Location locate(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
                                   double tolerance) const
     {
-        return locator.locate(locating, path, lo.s, lo.value, lo.rate, hi.s, hi.value, hi.rate,
-                              tolerance);
+        return locator.locate(locating, path, lo, hi, tolerance);
     }
     [[nodiscard]] bool leaves_plainly(double sign, const GuardSample& start, const GuardSample& end,
                                       double touch) const
     {
-        return detector.leaves_plainly(sign, start.s, start.value, start.rate, end.s, end.value,
-                                       end.rate, touch);
+        return detector.leaves_plainly(sign, start, end, touch);
     }
 };
 

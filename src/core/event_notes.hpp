@@ -8,7 +8,6 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline void EventSearch<X, single>::note_crossings(const CurrentStep& step, Bank& bank,
                                                    std::size_t i, const GuardSample& end,
-                                                   const EventResolution& resolution,
                                                    std::uint64_t& calls)
 {
     GuardRecord& record = bank[i];
@@ -23,7 +22,7 @@ inline void EventSearch<X, single>::note_crossings(const CurrentStep& step, Bank
         if (finding.touch) continue;
         if (!finding.hit) return;
         probe.watch(finding.side);
-        const Location where = find(probe, finding, bank, i, resolution);
+        const Location where = find(probe, finding, bank, i);
         const Side side = opposite(finding.side);
         bool counted = true;
         if (guard.system()->enabled_at) {

@@ -44,7 +44,7 @@ public:
           before_(like),
           hits_(guards),
           fired_(guards),
-          finest_(resolution.is_finest()),
+          resolution_(resolution),
           evidence_(finders.detector.evidence)
     {
     }
@@ -109,8 +109,7 @@ public:
 
     /// Finds the first set of acting guards in the step; a time event that is due at
     /// its end belongs to it if it lies in the window. False: none.
-    [[nodiscard]] bool find_set(const CurrentStep& step, Bank& bank,
-                                const EventResolution& resolution, bool time_event_due,
+    [[nodiscard]] bool find_set(const CurrentStep& step, Bank& bank, bool time_event_due,
                                 std::uint64_t& calls)
     {
         hits_.clear();
@@ -126,22 +125,22 @@ public:
         }
         if (suspects == 0) return false;
         if (suspects == 1 && bank.has_series(last) && find_by_series(step, bank, last, calls)) {
-            settle_place(step, resolution, time_event_due);
+            settle_place(step, time_event_due);
             return true;
         }
         bank.complete_rates(step, calls);
         if (suspects == 1) {
-            if (!find_only(step, bank, last, resolution, calls)) return false;
-        } else if (!find_among(step, bank, resolution, calls)) {
+            if (!find_only(step, bank, last, calls)) return false;
+        } else if (!find_among(step, bank, calls)) {
             return false;
         }
-        settle_place(step, resolution, time_event_due);
+        settle_place(step, time_event_due);
         return true;
     }
 
     /// Adds the crossings and touches of a recorded guard, up to the sample `end`.
     void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
-                        const EventResolution& resolution, std::uint64_t& calls);
+                        std::uint64_t& calls);
 
     /// Adds a located crossing of an acting guard that did not change anything.
     void note(std::size_t i, Side side)
@@ -193,12 +192,11 @@ public:
     /// Whether a guard crosses its surface with the set, that is, lies within rounding of it
     /// there. `sample` holds the rate of the guard.
     [[nodiscard]] bool crosses_with_set(const CurrentStep& step, const Bank& bank, std::size_t i,
-                                        const GuardSample& sample,
-                                        const EventResolution& resolution) const
+                                        const GuardSample& sample) const
     {
         // The rounding of a step of length s moves an event by a few ulp(s).
         const double rounding = 64 * std::numeric_limits<double>::epsilon() * sample.s;
-        const double reach = std::max(resolution.blur(step.time(sample.s)), rounding);
+        const double reach = std::max(resolution_.blur(step.time(sample.s)), rounding);
         // A guard that acts must be located in the set; one that is only recorded may be as far
         // from its surface as the rounding of its largest values.
         const double band = bank[i].acting ? 0 : bank.touch(i, step.h());
@@ -282,8 +280,8 @@ private:
         unresolved_ = unresolved_ || parts_.unresolved();
         const Watch whole = watch;
         const GuardSample end = watch.end;
-        const bool plain =
-            finest_ && parts_.nearly_cubic() && whole.start.s == parts_.whole().start.s;
+        const bool plain = resolution_.is_finest() && parts_.nearly_cubic() &&
+                           whole.start.s == parts_.whole().start.s;
         while (const GuardSample* node = parts_.next(watch.start.s, end.s)) {
             watch.end = *node;
             judge_by_its_own_size(watch, bank, i);
@@ -365,9 +363,7 @@ private:
         for (;;) {
             const GuardSample* next = parts_.next(node.s, whole.end.s);
             const GuardSample to = next ? *next : whole.end;
-            if (detector.suspects(-sign, node.value, node.rate, to.value, to.rate, to.s - node.s)) {
-                return false;
-            }
+            if (detector.suspects(-sign, node, to)) return false;
             if (!next) return true;
             node = *next;
         }
@@ -385,12 +381,11 @@ private:
         return finding;
     }
 
-    [[nodiscard]] Location find(Probe& probe, Finding finding, const Bank& bank, std::size_t i,
-                                const EventResolution& resolution)
+    [[nodiscard]] Location find(Probe& probe, Finding finding, const Bank& bank, std::size_t i)
     {
         if (finding.late) return {.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
         probe.agree_on(finding.lo, finding.hi, bank.start(i));
-        const double tolerance = std::max(resolution.tolerance(probe.step().time(finding.hi.s)),
+        const double tolerance = std::max(resolution_.tolerance(probe.step().time(finding.hi.s)),
                                           bank.unresolved(i, probe.step().h()));
         if (!bank[i].info.boolean)
             return finders_->locate(probe, finding.lo, finding.hi, tolerance);
@@ -461,13 +456,12 @@ private:
         return std::isfinite(root) ? root : finding.hi.s;
     }
 
-    void locate(const CurrentStep& step, Bank& bank, Hit& hit, const EventResolution& resolution,
-                std::uint64_t& calls)
+    void locate(const CurrentStep& step, Bank& bank, Hit& hit, std::uint64_t& calls)
     {
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
         probe.watch(hit.side);
-        hit.where = find(probe, hit.finding, bank, hit.guard, resolution);
+        hit.where = find(probe, hit.finding, bank, hit.guard);
         hit.located = true;
     }
 
@@ -475,7 +469,7 @@ private:
     /// every event needs is inlined here: handing samples from one function to another
     /// through memory takes as long as the location itself.
     [[gnu::flatten]] bool find_only(const CurrentStep& step, Bank& bank, std::size_t i,
-                                    const EventResolution& resolution, std::uint64_t& calls)
+                                    std::uint64_t& calls)
     {
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
@@ -486,13 +480,13 @@ private:
                                      bank.touch(i, step.h()))) {
             probe.watch(side);
             const double tolerance =
-                std::max(resolution.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
+                std::max(resolution_.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
             const Location where =
                 finders_->locate(probe, bank.start(i), bank.end(i, step.h()), tolerance);
             keep_only(i, side, where, probe.state_at(where));
             return true;
         }
-        return find_only_carefully(step, bank, i, resolution, calls);
+        return find_only_carefully(step, bank, i, calls);
     }
 
     /// As `find_only`, for a guard with a power series that determines its first departure.
@@ -500,7 +494,6 @@ private:
                                       std::uint64_t& calls);
 
     [[gnu::noinline]] bool find_only_carefully(const CurrentStep& step, Bank& bank, std::size_t i,
-                                               const EventResolution& resolution,
                                                std::uint64_t& calls)
     {
         const auto guard = bank.view(i, step.mode(), calls);
@@ -512,7 +505,7 @@ private:
             if (!finding.hit) return false;
             late_ = finding.late;
             probe.watch(finding.side);
-            const Location where = find(probe, finding, bank, i, resolution);
+            const Location where = find(probe, finding, bank, i);
             keep_only(i, finding.side, where, finding.late ? step.x0() : probe.state_at(where));
             return true;
         }
@@ -532,24 +525,19 @@ private:
     }
 
     /// The first set among several candidates.
-    [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank,
-                                  const EventResolution& resolution, std::uint64_t& calls);
+    [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
 
     /// Locates the only guard of the set, and keeps the state at its root.
-    void locate_alone(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
-                      std::uint64_t& calls);
+    void locate_alone(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
 
     /// Locates candidates until every one that has left its side by the end of the
     /// window is located; the set is those that lie in the window.
-    void close_set(const CurrentStep& step, Bank& bank, const EventResolution& resolution,
-                   std::uint64_t& calls);
+    void close_set(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
 
-    [[nodiscard]] double window_end(const CurrentStep& step,
-                                    const EventResolution& resolution) noexcept;
+    [[nodiscard]] double window_end(const CurrentStep& step) noexcept;
 
     /// The set happens at its latest root, or at the time event that it belongs to.
-    void settle_place(const CurrentStep& step, const EventResolution& resolution,
-                      bool time_event_due);
+    void settle_place(const CurrentStep& step, bool time_event_due);
 
     const Finders<X>* finders_;
     ProbeSpace<X> space_;
@@ -557,7 +545,7 @@ private:
     GuardList<Hit, single> hits_;
     GuardList<std::size_t, single> fired_;
     std::vector<Note> notes_;
-    bool finest_;
+    EventResolution resolution_;
     ResolvedParts parts_;
     bool refined_ = false;
     bool unresolved_ = false;

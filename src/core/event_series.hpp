@@ -11,29 +11,33 @@ Finding EventSearch<X, single>::next_on_series(Probe& probe, Watch& watch, const
 {
     const Crossing crossing = bank[i].info.crossing;
     const GuardSample end = watch.end;
-    double sign = sign_of(watch.side);
-    bool from_surface = watch.start.s > 0 || std::fabs(watch.start.value) <= watch.touch;
-    const double ahead = from_surface ? watch.start.rate : watch.start.value;
-    if (!(sign * ahead > 0)) return finders_->examine(probe, watch);
+    GuardSeries guard{
+        .terms = bank.series(),
+        .which = i,
+        .h = probe.step().h(),
+        .sign = sign_of(watch.side),
+        .from_surface = watch.start.s > 0 || std::fabs(watch.start.value) <= watch.touch,
+        .touch = bank[i].info.touch};
+    const double ahead = guard.from_surface ? watch.start.rate : watch.start.value;
+    if (!(guard.sign * ahead > 0)) return finders_->examine(probe, watch);
     constexpr int most_doubts = 8;  // with more, the series determines nothing about the rest
     for (int doubts = 0; doubts <= most_doubts;) {
-        const SeriesInterval found =
-            first_leaving(bank.series(), i, sign, probe.step().h(), watch.start, end,
-                          bank[i].info.touch, from_surface);
+        const SeriesInterval found = first_leaving(guard, watch.start, end);
         if (found.kind == SeriesInterval::Kind::clear) {
-            if (!(sign * end.value > 0)) break;
+            if (!(guard.sign * end.value > 0)) break;
             watch.side_after = watch.side;
             return Finding::clear(Evidence::proved);
         }
         const GuardSample lo =
             found.lo > watch.start.s ? probe.value_and_rate(found.lo) : watch.start;
         GuardSample hi = found.hi < end.s ? probe.value_and_rate(found.hi) : end;
-        from_surface = from_surface && lo.s == watch.start.s;
-        const auto turn = bank[i].info.touch == 0 ? turn_between(probe, lo, hi) : std::nullopt;
-        const bool passes = turn && sign * turn->value > 0 && sign * lo.value > 0;
-        const bool dips = turn && sign * turn->value < 0 && sign * lo.value > 0;
+        guard.from_surface = guard.from_surface && lo.s == watch.start.s;
+        const auto turn = guard.touch == 0 ? turn_between(probe, lo, hi) : std::nullopt;
+        const bool passes = turn && guard.sign * turn->value > 0 && guard.sign * lo.value > 0;
+        const bool dips = turn && guard.sign * turn->value < 0 && guard.sign * lo.value > 0;
         if (dips) hi = *turn;
-        const bool agrees = (from_surface || sign * lo.value > 0) && sign * hi.value < 0;
+        const bool agrees =
+            (guard.from_surface || guard.sign * lo.value > 0) && guard.sign * hi.value < 0;
         watch.start = lo;
         watch.end = hi;
         if (dips || (found.kind == SeriesInterval::Kind::crossing && agrees)) {
@@ -50,9 +54,9 @@ Finding EventSearch<X, single>::next_on_series(Probe& probe, Watch& watch, const
         if (!(hi.s < end.s)) return Finding::clear(evidence_);
         watch.start = hi;
         watch.end = end;
-        sign = sign_of(watch.side);
-        from_surface = false;
-        if (!(sign * hi.value > 0)) return finders_->examine(probe, watch);
+        guard.sign = sign_of(watch.side);
+        guard.from_surface = false;
+        if (!(guard.sign * hi.value > 0)) return finders_->examine(probe, watch);
     }
     return finders_->examine(probe, watch);
 }
@@ -80,7 +84,7 @@ bool EventSearch<X, single>::find_by_series(const CurrentStep& step, Bank& bank,
                                             std::uint64_t& calls)
 {
     const GuardRecord& record = bank[i];
-    if (!finest_ || !finders_->locator.yields_to_series) return false;
+    if (!resolution_.is_finest() || !finders_->locator.yields_to_series) return false;
     if (record.from > 0 || !counts(record.side, record.info.crossing)) return false;
     if (record.info.touch > 0) return false;
     SeriesCrossing crossing{.which = i,

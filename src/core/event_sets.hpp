@@ -7,7 +7,6 @@ namespace ricochet::detail {
 
 template <class X, bool single>
 inline bool EventSearch<X, single>::find_among(const CurrentStep& step, Bank& bank,
-                                               const EventResolution& resolution,
                                                std::uint64_t& calls)
 {
     for (const std::size_t i : bank.suspects()) {
@@ -15,14 +14,13 @@ inline bool EventSearch<X, single>::find_among(const CurrentStep& step, Bank& ba
         examine(step, bank, i, calls);
     }
     if (hits_.empty()) return false;
-    close_set(step, bank, resolution, calls);
-    if (fired_.size() == 1) locate_alone(step, bank, resolution, calls);
+    close_set(step, bank, calls);
+    if (fired_.size() == 1) locate_alone(step, bank, calls);
     return true;
 }
 
 template <class X, bool single>
 inline void EventSearch<X, single>::locate_alone(const CurrentStep& step, Bank& bank,
-                                                 const EventResolution& resolution,
                                                  std::uint64_t& calls)
 {
     Hit& hit = *std::find_if(hits_.begin(), hits_.end(),
@@ -30,7 +28,7 @@ inline void EventSearch<X, single>::locate_alone(const CurrentStep& step, Bank& 
     const auto guard = bank.view(hit.guard, step.mode(), calls);
     Probe probe(guard, step, space_);
     probe.watch(hit.side);
-    hit.where = find(probe, hit.finding, bank, hit.guard, resolution);
+    hit.where = find(probe, hit.finding, bank, hit.guard);
     at_ = hit.where.root;
     at_remainder_ = hit.where.root_remainder;
     assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
@@ -38,7 +36,6 @@ inline void EventSearch<X, single>::locate_alone(const CurrentStep& step, Bank& 
 
 template <class X, bool single>
 inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& bank,
-                                              const EventResolution& resolution,
                                               std::uint64_t& calls)
 {
     double first = std::numeric_limits<double>::infinity();
@@ -47,9 +44,9 @@ inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& ban
         first = std::min(first, hit.guess);
     }
     for (Hit& hit : hits_) {
-        if (hit.guess == first) locate(step, bank, hit, resolution, calls);
+        if (hit.guess == first) locate(step, bank, hit, calls);
     }
-    double limit = window_end(step, resolution);
+    double limit = window_end(step);
     for (bool changed = true; changed;) {
         changed = false;
         const double at = std::min(limit, step.h());
@@ -62,10 +59,10 @@ inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& ban
                 const auto guard = bank.view(hit.guard, step.mode(), calls);
                 if (!has_left(hit.side, guard.value(step.time(at), before_))) continue;
             }
-            locate(step, bank, hit, resolution, calls);
+            locate(step, bank, hit, calls);
             changed = true;
         }
-        limit = window_end(step, resolution);
+        limit = window_end(step);
     }
     for (Hit& hit : hits_) {
         if (hit.located && hit.where.root <= limit) fired_.push_back(hit.guard);
@@ -73,20 +70,17 @@ inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& ban
 }
 
 template <class X, bool single>
-inline double EventSearch<X, single>::window_end(const CurrentStep& step,
-                                                 const EventResolution& resolution) noexcept
+inline double EventSearch<X, single>::window_end(const CurrentStep& step) noexcept
 {
     double first = std::numeric_limits<double>::infinity();
     for (const Hit& hit : hits_) {
         if (hit.located) first = std::min(first, hit.where.root);
     }
-    return first + resolution.window(step.time(first));
+    return first + resolution_.window(step.time(first));
 }
 
 template <class X, bool single>
-inline void EventSearch<X, single>::settle_place(const CurrentStep& step,
-                                                 const EventResolution& resolution,
-                                                 bool time_event_due)
+inline void EventSearch<X, single>::settle_place(const CurrentStep& step, bool time_event_due)
 {
     if (fired_.size() > 1) {
         at_ = 0;
@@ -102,7 +96,7 @@ inline void EventSearch<X, single>::settle_place(const CurrentStep& step,
             step.restep(at_, before_);
         }
     }
-    if (time_event_due && at_ + resolution.window(step.time(at_)) >= step.h()) {
+    if (time_event_due && at_ + resolution_.window(step.time(at_)) >= step.h()) {
         at_ = step.h();
         at_remainder_ = 0;
         assign(before_, step.x1());

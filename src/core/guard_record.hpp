@@ -121,7 +121,7 @@ struct BankRules {
     bool bounded = false;
     /// Whether guards can be examined inside a step.
     bool checks_inside = false;
-    bool (*suspects)(double, double, double, double, double, double) = nullptr;
+    Suspects* suspects = nullptr;
 
     /// Whether sizes are kept from step to step.
     [[nodiscard]] bool keeps_sizes() const noexcept { return remembers || bounded; }

@@ -201,7 +201,8 @@ public:
         if (has_series(i)) return !is_clear_of_series(i, h);
         const double band = sign_[i] * records_[i].info.touch;  // worth a check if it is reached
         const bool suspected = with_screen([&](auto screen) __attribute__((always_inline)) {
-            return screen.suspects(sign_[i], g0_[i] - band, rate0_[i], g1_[i] - band, rate1_[i], h);
+            return screen.suspects(sign_[i], {.value = g0_[i] - band, .rate = rate0_[i]},
+                                   {.s = h, .value = g1_[i] - band, .rate = rate1_[i]});
         });
         return suspected || !is_finite(g1_[i]) || (checked() && hides(i, h));
     }
@@ -259,7 +260,7 @@ protected:
     }
 
     struct OwnScreen {
-        bool (*suspects)(double, double, double, double, double, double);
+        Suspects* suspects;
     };
 
     /// Calls `use` with the detector's own screening function, inlined.
@@ -324,8 +325,8 @@ protected:
     {
         return [ this, screen, h ](std::size_t i) __attribute__((always_inline))
         {
-            const bool suspected =
-                screen.suspects(sign_[i], g0_[i], rate0_[i], g1_[i], rate1_[i], h);
+            const bool suspected = screen.suspects(sign_[i], {.value = g0_[i], .rate = rate0_[i]},
+                                                   {.s = h, .value = g1_[i], .rate = rate1_[i]});
             const bool armed = sign_[i] != 0;
             return suspected & armed;
         };
@@ -461,9 +462,13 @@ protected:
         const bool departs = records_[i].departs && starts_phase_;
         if (records_[i].from > 0 || !(sign_[i] * g1_[i] > touch)) return false;
         if (!departs && sign_[i] * g0_[i] < 0) return false;
-        const bool from_surface = starts_on_surface(i);
-        return series_clears(series_, i, sign_[i], h, touch, from_surface) ||
-               series_clears_closely(series_, i, sign_[i], h, touch, from_surface);
+        const GuardSeries guard{.terms = series_,
+                                .which = i,
+                                .h = h,
+                                .sign = sign_[i],
+                                .from_surface = starts_on_surface(i),
+                                .touch = touch};
+        return series_clears(guard) || series_clears_closely(guard);
     }
 
     SeriesTerms series_;

@@ -25,12 +25,13 @@ inline constexpr auto inverse_binomials = [] {
     return out;
 }();
 
-/// The degree of the series of guard i without trailing zeros; at least 1.
-[[nodiscard]] int degree_of(const SeriesTerms& terms, std::size_t i) noexcept
+/// The degree of the series of a guard without trailing zeros; at least 1.
+[[nodiscard]] int degree_of(const GuardSeries& guard) noexcept
 {
+    const SeriesTerms& terms = guard.terms;
     int degree = terms.order;
     while (degree > 1 &&
-           terms.coefficients[static_cast<std::size_t>(degree) * terms.stride + i] == 0) {
+           terms.coefficients[static_cast<std::size_t>(degree) * terms.stride + guard.which] == 0) {
         --degree;
     }
     return degree;
@@ -38,8 +39,9 @@ inline constexpr auto inverse_binomials = [] {
 
 class SeriesSearch {
 public:
-    SeriesSearch(int degree, double h, double touch) noexcept
-        : degree_(degree), h_(h), touch_(touch)
+    /// Keeps a reference to the guard.
+    SeriesSearch(const GuardSeries& guard, int degree) noexcept
+        : guard_(guard), degree_(degree), h_(guard.h), touch_(guard.touch)
     {
     }
 
@@ -49,19 +51,22 @@ public:
         error_ += 2 * std::max(std::fabs(c[0] - start), std::fabs(c[at(degree_)] - end));
     }
 
-    /// The sum of the absolute values of all terms.
-    [[nodiscard]] double size() const noexcept { return size_; }
+    /// Whether there is a root at the start, where the coefficients begin with c[0].
+    [[nodiscard]] bool starts_at_root(const Coefficients& c) const noexcept
+    {
+        return guard_.from_surface && std::fabs(c[0]) <= touch_ + 0x1p-44 * size_;
+    }
 
     /// The coefficients in Bernstein form on [0, 1]; terms beyond the degree are counted as errors.
-    void convert(const SeriesTerms& terms, std::size_t i, double sign, Coefficients& c) noexcept
+    void convert(Coefficients& c) noexcept
     {
+        const SeriesTerms& terms = guard_.terms;
         const Coefficients& inverse = inverse_binomials[at(degree_)];
-        double power = sign;
+        double power = guard_.sign;
         double size = 0;
         double tail = 0;
         for (int k = 0; k <= terms.order; ++k) {
-            const double q =
-                power * terms.coefficients[static_cast<std::size_t>(k) * terms.stride + i];
+            const double q = power * terms.coefficients[at(k) * terms.stride + guard_.which];
             size += std::fabs(q);
             if (k <= degree_) {
                 c[at(k)] = q * inverse[at(k)];
@@ -76,7 +81,7 @@ public:
         // Each coefficient is a sum of `degree` terms whose sizes add up to at most `size`, and
         // whose powers have as many roundings.
         size_ = size;
-        error_ = tail + 4 * last_terms(terms, i, h_) +
+        error_ = tail + 4 * last_terms(terms, guard_.which, h_) +
                  4 * degree_ * std::numeric_limits<double>::epsilon() * size;
     }
 
@@ -135,6 +140,7 @@ private:
         return static_cast<std::size_t>(i);
     }
 
+    const GuardSeries& guard_;
     int degree_;
     double h_;
     double touch_;
@@ -144,37 +150,34 @@ private:
 
 }  // namespace
 
-bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign, double h,
-                           double touch, bool from_surface) noexcept
+bool series_clears_closely(GuardSeries guard) noexcept
 {
     using Kind = SeriesInterval::Kind;
     Coefficients c;
-    const int degree = degree_of(terms, i);
+    const int degree = degree_of(guard);
     // A root at the start is a root of the sum of all terms, not of the first.
     constexpr int some = 8;
-    if (degree > some && !from_surface) {
-        SeriesSearch search(some, h, touch);
-        search.convert(terms, i, sign, c);
-        if (search.first(c, 0, h, false).kind == Kind::clear) return true;
+    if (degree > some && !guard.from_surface) {
+        SeriesSearch search(guard, some);
+        search.convert(c);
+        if (search.first(c, 0, guard.h, false).kind == Kind::clear) return true;
     }
-    SeriesSearch search(degree, h, touch);
-    search.convert(terms, i, sign, c);
-    if (from_surface && std::fabs(c[0]) > touch + 0x1p-44 * search.size()) return false;
-    return search.first(c, 0, h, from_surface).kind == Kind::clear;
+    SeriesSearch search(guard, degree);
+    search.convert(c);
+    if (guard.from_surface && !search.starts_at_root(c)) return false;
+    return search.first(c, 0, guard.h, guard.from_surface).kind == Kind::clear;
 }
 
-SeriesInterval first_leaving(const SeriesTerms& terms, std::size_t i, double sign, double h,
-                             const GuardSample& start, const GuardSample& end, double touch,
-                             bool from_surface) noexcept
+SeriesInterval first_leaving(const GuardSeries& guard, const GuardSample& start,
+                             const GuardSample& end) noexcept
 {
-    SeriesSearch search(degree_of(terms, i), h, touch);
+    SeriesSearch search(guard, degree_of(guard));
     Coefficients c;
-    search.convert(terms, i, sign, c);
-    if (end.s < h) search.keep_left(c, end.s / h);
+    search.convert(c);
+    if (end.s < guard.h) search.keep_left(c, end.s / guard.h);
     if (start.s > 0) search.keep_right(c, start.s / end.s);
-    search.blur(c, sign * start.value, sign * end.value);
-    const bool root = from_surface && std::fabs(c[0]) <= touch + 0x1p-44 * search.size();
-    return search.first(c, start.s, end.s, root);
+    search.blur(c, guard.sign * start.value, guard.sign * end.value);
+    return search.first(c, start.s, end.s, search.starts_at_root(c));
 }
 
 }  // namespace ricochet::detail

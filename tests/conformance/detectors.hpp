@@ -83,8 +83,7 @@ struct CurveSystem {
 struct DetectorCase {
     std::string name;
     std::function<Finding(const HostStep&, Watch&, Crossing, std::uint64_t*)> look;
-    std::function<bool(double sign, double g0, double rate0, double g1, double rate1, double h)>
-        suspects;
+    std::function<bool(double sign, const GuardSample& start, const GuardSample& end)> suspects;
     std::function<bool(double sign, const GuardSample&, const GuardSample&, double touch)>
         leaves_plainly;
     Evidence unsuspected{};        ///< of a step that is not suspected
@@ -145,7 +144,8 @@ protected:
 
     [[nodiscard]] static bool suspects(const Curve& g, double sign)
     {
-        return GetParam().suspects(sign, g.value(0), g.rate(0), g.value(1), g.rate(1), 1);
+        return GetParam().suspects(sign, {.s = 0, .value = g.value(0), .rate = g.rate(0)},
+                                   {.s = 1, .value = g.value(1), .rate = g.rate(1)});
     }
 
     /// Expects that nothing is found, with evidence no stronger than the detector has.
@@ -438,9 +438,10 @@ TEST_P(DetectorSuite, NotANumberIsNoEvidence)
 {
     const double nan = std::numeric_limits<double>::quiet_NaN();
     // At the end: the step is examined, and never treated as one that only leaves.
-    EXPECT_TRUE(GetParam().suspects(1, 1, -1, nan, -1, 1));
     const GuardSample start{.s = 0, .value = 1, .rate = -1};
-    EXPECT_FALSE(GetParam().leaves_plainly(1, start, {.s = 1, .value = nan, .rate = -1}, 0));
+    const GuardSample lost{.s = 1, .value = nan, .rate = -1};
+    EXPECT_TRUE(GetParam().suspects(1, start, lost));
+    EXPECT_FALSE(GetParam().leaves_plainly(1, start, lost, 0));
     const Curve ends{[=](double s) { return s < 1 ? 2 - s : nan; }, [](double) { return -1.0; }};
     // Inside, where the guard turns back before it reaches its surface, or does not turn.
     const Curve hole{[=](double s) { return s > 0 && s < 1 ? nan : 1.0; },
@@ -504,8 +505,10 @@ TEST_P(DetectorSuite, AStepThatIsNotSuspectedHasNothingToFind)
     }
     if (GetParam().sees_pairs) {
         // It turns far from its surface, but the ends do not show its path there.
-        EXPECT_TRUE(GetParam().suspects(1, 1, -1, 1, 1, 1));
-        EXPECT_TRUE(GetParam().suspects(-1, -1, 1, -1, -1, 1));
+        EXPECT_TRUE(GetParam().suspects(1, {.s = 0, .value = 1, .rate = -1},
+                                        {.s = 1, .value = 1, .rate = 1}));
+        EXPECT_TRUE(GetParam().suspects(-1, {.s = 0, .value = -1, .rate = 1},
+                                        {.s = 1, .value = -1, .rate = -1}));
     }
     // A detector that suspects every step declares `proved`, which holds for the steps that are
     // left: those without armed guards.

@@ -17,6 +17,7 @@ namespace ricochet::series_guard_test {
 namespace {
 
 using detail::first_leaving;
+using detail::GuardSeries;
 using detail::series_clears;
 using detail::SeriesInterval;
 using Kind = SeriesInterval::Kind;
@@ -37,9 +38,10 @@ using Kind = SeriesInterval::Kind;
     }
     return c;
 }
-[[nodiscard]] SeriesTerms terms_of(const std::vector<double>& c)
+/// The polynomial as a guard in a step of length 1.
+[[nodiscard]] GuardSeries guard_of(const std::vector<double>& c, double sign, bool from_surface)
 {
-    return {c.data(), 12, 1};
+    return {.terms = {c.data(), 12, 1}, .h = 1, .sign = sign, .from_surface = from_surface};
 }
 
 /// The first event of the polynomial in a step of length 1.
@@ -47,8 +49,8 @@ using Kind = SeriesInterval::Kind;
 {
     double end = 0;
     for (const double term : c) end += term;
-    return first_leaving(terms_of(c), 0, sign, 1, {.s = 0, .value = c[0]}, {.s = 1, .value = end},
-                         0, from_surface);
+    return first_leaving(guard_of(c, sign, from_surface), {.s = 0, .value = c[0]},
+                         {.s = 1, .value = end});
 }
 
 TEST(SeriesGuard, ExclusionIsNeverSaidOfAPolynomialThatReachesZero)
@@ -64,7 +66,7 @@ TEST(SeriesGuard, ExclusionIsNeverSaidOfAPolynomialThatReachesZero)
         for (int i = 0; i < 5; ++i) roots.push_back((i % 2 == 0 ? 1 : -1) * outside(random));
         std::vector<double> c = with_roots(roots, 1);
         const double sign = c[0] > 0 ? 1 : -1;
-        const bool clear = series_clears(terms_of(c), 0, sign, 1, 0, false);
+        const bool clear = series_clears(guard_of(c, sign, false));
         EXPECT_FALSE(clear && inside > 0);
         cleared += clear;
         const SeriesInterval first = first_of(c, sign, false);
@@ -87,8 +89,10 @@ TEST(SeriesGuard, ExclusionIsNeverSaidOfAPolynomialThatReachesZero)
 TEST(SeriesGuard, ARootAtTheStartIsDividedOut)
 {
     const std::vector<double> c = with_roots({0, 0.75}, -1);
-    EXPECT_FALSE(series_clears(terms_of(c), 0, 1, 1, 0, true));
-    EXPECT_TRUE(series_clears(terms_of(c), 0, 1, 0.5, 0, true));
+    GuardSeries guard = guard_of(c, 1, true);
+    EXPECT_FALSE(series_clears(guard));
+    guard.h = 0.5;
+    EXPECT_TRUE(series_clears(guard));
     const SeriesInterval first = first_of(c, 1, true);
     EXPECT_EQ(first.kind, Kind::crossing);
     EXPECT_LE(first.lo, 0.75);
@@ -174,8 +178,7 @@ TEST(SeriesGuard, RootsAreLocatedAndAreTheFirst)
         double end = 0;
         for (const double term : c) end += term;
         detail::SeriesRoot root;
-        if (!detail::find_first_root(terms_of(c), 0, sign, 1, sign * end, from_surface, root))
-            continue;
+        if (!detail::find_first_root(guard_of(c, sign, from_surface), sign * end, root)) continue;
         ++found;
         double first = 1;
         for (const double r : roots) first = r > 0 ? std::min(first, r) : first;

@@ -18,10 +18,10 @@ public:
 
     explicit Around(const Exact& exact) : exact_(exact) {}
 
-    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
-                                                 double rate1, double h) noexcept
+    [[nodiscard]] static constexpr bool suspects(double sign, const GuardSample& start,
+                                                 const GuardSample& end) noexcept
     {
-        return Exact::suspects(sign, g0, rate0, g1, rate1, h);
+        return Exact::suspects(sign, start, end);
     }
 
     [[nodiscard]] static bool leaves_plainly(double sign, const GuardSample& start,

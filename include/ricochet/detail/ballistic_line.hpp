@@ -40,10 +40,10 @@ struct BallisticLine {
         return value + h * (rate + 0.5 * h * curvature) > 0;
     }
 
-    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
-                                                 double rate1, double h) noexcept
+    [[nodiscard]] static constexpr bool suspects(double sign, const GuardSample& start,
+                                                 const GuardSample& end) noexcept
     {
-        return Ends::suspects(sign, g0, rate0, g1, rate1, h);
+        return Ends::suspects(sign, start, end);
     }
 
     /// A prediction may be late, so every event is examined with care.

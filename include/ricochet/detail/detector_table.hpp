@@ -19,6 +19,9 @@ struct MeterOptions;
 
 namespace ricochet::detail {
 
+/// As `Extremum::suspects`.
+using Suspects = bool(double sign, const GuardSample& start, const GuardSample& end);
+
 /// Answer of a gate about a state, see `gates::Gate::Answer`.
 struct GateAnswer {
     double cleared = 0;
@@ -34,11 +37,9 @@ struct DetectorTable {
     bool uses_rates = false;
     bool checks_inside = false;
     Evidence evidence = Evidence::assumed;  ///< of a step not suspected
-    bool (*suspects)(double sign, double g0, double rate0, double g1, double rate1,
-                     double h) = nullptr;
-    /// Samples of the guard are passed as numbers, which stay in registers.
-    bool (*leaves_plainly)(double sign, double s0, double g0, double rate0, double s1, double g1,
-                           double rate1, double touch) = nullptr;
+    Suspects* suspects = nullptr;
+    bool (*leaves_plainly)(double sign, const GuardSample& start, const GuardSample& end,
+                           double touch) = nullptr;
     Finding (*examine)(Self, GuardPath& path, Watch& watch) = nullptr;
     /// Checks whether it fits the system, in steps between `smallest` and `largest` [s].
     /// @throws std::invalid_argument if it does not
@@ -68,9 +69,8 @@ struct DetectorTable {
 
 struct LocatorTable {
     const char* type = "";
-    Location (*locate)(const void* self, GuardPath& path, double lo, double lo_value,
-                       double lo_rate, double hi, double hi_value, double hi_rate,
-                       double tolerance) = nullptr;
+    Location (*locate)(const void* self, GuardPath& path, const GuardSample& lo,
+                       const GuardSample& hi, double tolerance) = nullptr;
     /// Whether the locator is not called where the series of the guard gives a root.
     bool yields_to_series = false;
 };

@@ -100,11 +100,12 @@ class DetectorTableOf {
         table.uses_rates = Detector::uses_rates;
         table.checks_inside = ChecksInside<Detector>;
         table.evidence = Detector::evidence;
-        table.suspects = [](double sign, double g0, double rate0, double g1, double rate1,
-                            double h) { return Detector::suspects(sign, g0, rate0, g1, rate1, h); };
-        table.leaves_plainly = [](double sign, double s0, double g0, double rate0, double s1,
-                                  double g1, double rate1, double touch) {
-            return Detector::leaves_plainly(sign, {s0, g0, rate0}, {s1, g1, rate1}, touch);
+        table.suspects = [](double sign, const GuardSample& start, const GuardSample& end) {
+            return Detector::suspects(sign, start, end);
+        };
+        table.leaves_plainly = [](double sign, const GuardSample& start, const GuardSample& end,
+                                  double touch) {
+            return Detector::leaves_plainly(sign, start, end, touch);
         };
         table.examine = [](Self d, GuardPath& path, Watch& watch) {
             return self(d).examine(path, watch);
@@ -148,15 +149,12 @@ public:
 template <class Locator>
 [[nodiscard]] LocatorTable locator_table() noexcept
 {
-    return {
-        .type = written_type<Locator>(),
-        .locate = [](const void* self, GuardPath& path, double lo, double lo_value, double lo_rate,
-                     double hi, double hi_value, double hi_rate, double tolerance) -> Location {
-            return static_cast<const Locator*>(self)->locate(
-                path, GuardSample{lo, lo_value, lo_rate}, GuardSample{hi, hi_value, hi_rate},
-                tolerance);
-        },
-        .yields_to_series = std::is_same_v<Locator, Newton>};
+    return {.type = written_type<Locator>(),
+            .locate = [](const void* self, GuardPath& path, const GuardSample& lo,
+                         const GuardSample& hi, double tolerance) -> Location {
+                return static_cast<const Locator*>(self)->locate(path, lo, hi, tolerance);
+            },
+            .yields_to_series = std::is_same_v<Locator, Newton>};
 }
 
 }  // namespace ricochet::detail

@@ -186,7 +186,8 @@ private:
         if constexpr (rates) at.rate1 = guard.raw_rate(t1, x1, rate1, h);
         QuietEnd why = QuietEnd::due;
         // The loop replaces a rate that is not finite.
-        if (Screen::suspects(at.sign, at.g0, at.rate0, at.g1, at.rate1, h) ||
+        if (Screen::suspects(at.sign, {.value = at.g0, .rate = at.rate0},
+                             {.s = h, .value = at.g1, .rate = at.rate1}) ||
             !std::isfinite(at.g1 + at.rate1)) {
             why = QuietEnd::doubt;
         }

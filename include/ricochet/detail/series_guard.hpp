@@ -32,6 +32,17 @@ struct SeriesInterval {
     double hi = 0;  ///< [s]
 };
 
+/// The power series of one guard over a step, and what the guard is checked for.
+struct GuardSeries {
+    SeriesTerms terms;  ///< of all guards
+    std::size_t which = 0;
+    double h = 0;     ///< [s] length of the step
+    double sign = 1;  ///< of the armed side: times this, the guard is positive there
+    /// Whether the guard starts on its surface: there is a root at 0, which does not count.
+    bool from_surface = false;
+    double touch = 0;  ///< value of the guard, times `sign`, down to which it is clear
+};
+
 /// Sizes of the last two terms of guard i at h together, which measure the terms that its series
 /// omits.
 [[nodiscard, gnu::always_inline]] inline double last_terms(const SeriesTerms& terms, std::size_t i,
@@ -55,13 +66,13 @@ struct SeriesInterval {
     return last_terms(terms, i, h) <= 0x1p-20 * std::max(std::fabs(g0), std::fabs(g1));
 }
 
-/// Whether guard i, times `sign`, stays above `touch` in (0, h], proved except for the terms that
-/// its series omits. `from_surface`: it starts on its surface, and this root is divided out.
-[[nodiscard, gnu::always_inline]] inline bool series_clears(const SeriesTerms& terms, std::size_t i,
-                                                            double sign, double h, double touch,
-                                                            bool from_surface) noexcept
+/// Whether the guard stays clear in (0, h], proved except for the terms that its series omits. A
+/// root at the start is divided out.
+[[nodiscard, gnu::always_inline]] inline bool series_clears(const GuardSeries& guard) noexcept
 {
-    const double* const g = terms.coefficients + i;
+    const SeriesTerms& terms = guard.terms;
+    const double sign = guard.sign, h = guard.h, touch = guard.touch;
+    const double* const g = terms.coefficients + guard.which;
     const std::size_t n = terms.stride;
     const auto size_of = [&](int k) { return std::fabs(g[static_cast<std::size_t>(k) * n]); };
     const double h2 = h * h;
@@ -78,8 +89,8 @@ struct SeriesInterval {
     const double q3 = sign * g[3 * n] * (h * h2);
     // Some 50 roundings of at most the sum of all sizes.
     const double size = ((std::fabs(q0) + std::fabs(q1)) + (std::fabs(q2) + std::fabs(q3))) + tail;
-    const double less = (tail + 4 * last_terms(terms, i, h)) + 0x1p-47 * size;
-    if (from_surface) {
+    const double less = (tail + 4 * last_terms(terms, guard.which, h)) + 0x1p-47 * size;
+    if (guard.from_surface) {
         if (std::fabs(q0) > touch + 0x1p-44 * size) return false;
         const double middle = q1 + 0.5 * q2;
         return std::min(std::min(q1, middle), q1 + (q2 + q3)) - less > 0 &&
@@ -91,16 +102,14 @@ struct SeriesInterval {
     return std::min(std::min(q0, b1), std::min(b2, b3)) - less > touch;
 }
 
-/// The same with more terms, up to all of them.
-[[nodiscard]] bool series_clears_closely(const SeriesTerms& terms, std::size_t i, double sign,
-                                         double h, double touch, bool from_surface) noexcept;
+/// The same with more terms, up to all of them. Takes a copy, so that the caller's stays in
+/// registers for `series_clears`, which decides nearly every step.
+[[nodiscard]] bool series_clears_closely(GuardSeries guard) noexcept;
 
-/// First event of guard i, times `sign`, between the samples `start` and `end` in a step of length
-/// h. Where the samples differ from the series, which omits its last terms, nothing smaller than
-/// the difference is certain.
-[[nodiscard]] SeriesInterval first_leaving(const SeriesTerms& terms, std::size_t i, double sign,
-                                           double h, const GuardSample& start,
-                                           const GuardSample& end, double touch,
-                                           bool from_surface) noexcept;
+/// First event of the guard between the samples `start` and `end` in the step. Where the samples
+/// differ from the series, which omits its last terms, nothing smaller than the difference is
+/// certain.
+[[nodiscard]] SeriesInterval first_leaving(const GuardSeries& guard, const GuardSample& start,
+                                           const GuardSample& end) noexcept;
 
 }  // namespace ricochet::detail

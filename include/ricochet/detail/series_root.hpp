@@ -14,7 +14,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "ricochet/detail/dense_polynomial.hpp"
+#include "ricochet/detail/series_guard.hpp"
 
 namespace ricochet::detail {
 
@@ -26,13 +26,13 @@ struct SeriesRoot {
 /// The polynomial of one guard, times a sign; a root at 0 is divided out.
 class GuardPolynomial {
 public:
-    GuardPolynomial(const SeriesTerms& terms, std::size_t i, double sign,
-                    bool from_surface) noexcept
-        : c_(terms.coefficients + (from_surface ? terms.stride : 0) + i),
-          stride_(terms.stride),
-          last_(terms.order - 4),
-          sign_(sign),
-          top_(from_surface ? 0 : (*this)[terms.order])
+    explicit GuardPolynomial(const GuardSeries& guard) noexcept
+        : c_(guard.terms.coefficients + (guard.from_surface ? guard.terms.stride : 0) +
+             guard.which),
+          stride_(guard.terms.stride),
+          last_(guard.terms.order - 4),
+          sign_(guard.sign),
+          top_(guard.from_surface ? 0 : (*this)[guard.terms.order])
     {
     }
 
@@ -106,17 +106,17 @@ private:
     double top_;  ///< the coefficient after it
 };
 
-/// The first root of guard i in (0, h), where the guard, times `sign`, falls through it and ends at
-/// `end` < 0; false where that is not certain. `from_surface`: there is a root at 0, which does not
-/// count. Terms come in groups of four, after the constant.
-[[nodiscard]] inline bool find_first_root(const SeriesTerms& terms, std::size_t i, double sign,
-                                          double h, double end, bool from_surface,
+/// The first root of the guard in (0, h), where the guard, times its sign, falls through it and
+/// ends at `end` < 0; false where that is not certain. Terms come in groups of four, after the
+/// constant.
+[[nodiscard]] inline bool find_first_root(const GuardSeries& guard, double end,
                                           SeriesRoot& root) noexcept
 {
-    const GuardPolynomial p(terms, i, sign, from_surface);
+    const GuardPolynomial p(guard);
+    const double h = guard.h;
     // The parabola through the start, its slope and the end.
     const double v0 = p[0];
-    const double v1 = from_surface ? end / h : end;
+    const double v1 = guard.from_surface ? end / h : end;
     if (!(v0 > 0 && v1 < 0)) return false;
     const double r0 = p[1] * h;
     const double bend = v1 - v0 - r0;
@@ -138,7 +138,7 @@ private:
     if (!(s > 0 && s < h)) return false;
     double slope = 0;
     if (!p.is_first_root(s, slope)) return false;
-    root = {s, sign * (from_surface ? s * slope : slope)};
+    root = {s, guard.sign * (guard.from_surface ? s * slope : slope)};
     return true;
 }
 

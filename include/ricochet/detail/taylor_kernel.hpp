@@ -100,8 +100,10 @@ class TaylorKernel {
         if (step.is_motion) return std::numeric_limits<double>::infinity();
         RoomFor scratch(of);
         Room& room = scratch.room;
-        return find_reach(state.x0, state.component_atol, step.coefficients.data(), step.order,
-                          rtol, atol, room.w, step.doubtful);
+        const auto reach = find_reach(state.x0, step.coefficients.data(), step.order,
+                                      {rtol, atol, state.component_atol}, room.w);
+        step.doubtful = !reach.agree;
+        return reach.h;
     }
 
     static double reach(void* door, State& state, double rtol, double atol)
@@ -239,10 +241,12 @@ class TaylorKernel {
         const TStep& step = expand(door, state, at(door).step.asked);
         const double sign = crossing.side == Side::above ? 1 : -1;
         SeriesRoot root;
-        if (!find_first_root({step.guards.data(), step.order, step.guard_count()}, crossing.which,
-                             sign, state.h, sign * crossing.end, crossing.from_surface, root)) {
-            return false;
-        }
+        const GuardSeries on_series{.terms = {step.guards.data(), step.order, step.guard_count()},
+                                    .which = crossing.which,
+                                    .h = state.h,
+                                    .sign = sign,
+                                    .from_surface = crossing.from_surface};
+        if (!find_first_root(on_series, sign * crossing.end, root)) return false;
         const Guard guard(at(door).system(), crossing.calls, crossing.which, state.mode,
                           Crossing::falling, state.backward);
         const double* const c = step.coefficients.data();
@@ -366,11 +370,12 @@ class TaylorKernel {
                                                 const QuietRun& run)
     {
         if (!(run.sign * run.g1 > 0) || (!run.departs && run.sign * run.g0 < 0)) return false;
-        const bool from_surface = run.departs || run.sign * run.g0 <= 0;
-        const SeriesTerms terms{step.guards.data(), step.order, step.guard_count()};
-        if (!series_converges(terms, 0, state.h, run.g0, run.g1)) return false;
-        return series_clears(terms, 0, run.sign, state.h, 0, from_surface) ||
-               series_clears_closely(terms, 0, run.sign, state.h, 0, from_surface);
+        const GuardSeries guard{.terms = {step.guards.data(), step.order, step.guard_count()},
+                                .h = state.h,
+                                .sign = run.sign,
+                                .from_surface = run.departs || run.sign * run.g0 <= 0};
+        if (!series_converges(guard.terms, 0, state.h, run.g0, run.g1)) return false;
+        return series_clears(guard) || series_clears_closely(guard);
     }
 
     /// Whether the guard, if there is one, has no event in the current step, which then becomes the

@@ -31,14 +31,10 @@
 
 namespace ricochet::detail {
 
-/// As `find_reach`.
-/// @param each  absolute tolerances of the components in place of `atol`, or null
-/// @param agree  whether the last two terms agree
+/// As `find_reach` of one run.
 template <class Pack, std::size_t n>
-[[nodiscard, gnu::always_inline]] inline Pack find_reach(const std::array<Pack, n>& x0,
-                                                         const double* each, const Pack* c,
-                                                         int order, double rtol, double atol,
-                                                         typename Pack::Mask& agree)
+[[nodiscard, gnu::always_inline]] inline SeriesReach<Pack, typename Pack::Mask> find_reach(
+    const std::array<Pack, n>& x0, const Pack* c, int order, const Tolerances& allowed)
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     constexpr double least = std::numeric_limits<double>::min();
@@ -55,7 +51,7 @@ template <class Pack, std::size_t n>
         Pack last(0.0), before(0.0);
         const Pack* const cp = c + static_cast<std::size_t>(order) * n;
         for (std::size_t i = 0; i < n; ++i) {
-            const Pack scale = 1.0 / ((each ? each[i] : atol) + rtol * size[i]);
+            const Pack scale = 1.0 / (allowed.absolute(i) + allowed.rtol * size[i]);
             last = larger_of(last, size_of(cp[i]) * scale);
             before = larger_of(before, size_of(*(cp + i - n)) * scale);
         }
@@ -83,8 +79,7 @@ template <class Pack, std::size_t n>
         apart = select(going, apart, apart_before);
         going = going & (h < infinity);
     }
-    agree = apart <= most_apart;
-    return h;
+    return {h, apart <= most_apart};
 }
 
 /// As `last_terms`, for one guard.
@@ -100,11 +95,9 @@ template <class Pack>
 }
 
 /// As `series_clears`, above 0, for one guard.
-/// @param last  its `last_terms`
 template <class Pack, class Mask = typename Pack::Mask>
 [[nodiscard, gnu::always_inline]] inline Mask series_clears(const Pack* g, int order,
                                                             const Pack& sign, const Pack& h,
-                                                            const Pack& last,
                                                             const Mask& from_surface) noexcept
 {
     const Pack h2 = h * h;
@@ -120,7 +113,7 @@ template <class Pack, class Mask = typename Pack::Mask>
     const Pack q2 = sign * g[2] * h2;
     const Pack q3 = sign * g[3] * (h * h2);
     const Pack size = ((size_of(q0) + size_of(q1)) + (size_of(q2) + size_of(q3))) + tail;
-    const Pack less = (tail + 4.0 * last) + 0x1p-47 * size;
+    const Pack less = (tail + 4.0 * last_terms(g, order, h)) + 0x1p-47 * size;
     const Pack b1 = q0 + (1.0 / 3) * q1;
     const Pack b2 = q0 + (1.0 / 3) * (2.0 * q1 + q2);
     const Pack b3 = q0 + (q1 + (q2 + q3));
@@ -322,42 +315,50 @@ private:
         }
     }
 
+    /// The ends of the steps of all lanes.
+    struct StepEnds {
+        Pack h;                                  ///< [s] from their starts
+        std::array<Pack, n> x, remainder, rate;  ///< states, as x + remainder, and their rates
+        Pack g;                                  ///< the guards, if there are any
+    };
+
     /// Whether each active lane has taken its step.
     [[nodiscard, gnu::always_inline]] Mask take_step()
     {
         const double* const each =
             options_.component_atol.empty() ? nullptr : options_.component_atol.data();
         const Pack* const c = coefficients_.data();
-        Mask agree{};
-        const Pack reach = find_reach(x0_, each, c, order_, options_.rtol, options_.atol, agree);
+        const auto reach = find_reach(x0_, c, order_, {options_.rtol, options_.atol, each});
         const Pack ulp = std::numeric_limits<double>::epsilon() * size_of(start_);
         const Pack smallest =
             larger_of(options_.h_min, larger_of(4.0 * ulp, std::numeric_limits<double>::min()));
-        const Pack h = smaller_of(h_next_, reach);
+        const Pack h = smaller_of(h_next_, reach.h);
         const Pack until = in_time((end_ - start_) - start_remainder_);
-        Mask fine =
-            (active_ & (steps_ < most_steps_)) & ((reach >= smallest) & ~(h * (1 + 1e-6) >= until));
-        fine = fine & agree;  // the end of another step is checked in the lane's own loop
+        Mask fine = (active_ & (steps_ < most_steps_)) &
+                    ((reach.h >= smallest) & ~(h * (1 + 1e-6) >= until));
+        fine = fine & reach.agree;  // the end of another step is checked in the lane's own loop
         if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
             fine = fine & ~fine;
         }
 
-        std::array<Pack, n> w, rate, x1, remainder;
-        evaluate_departure<true>(c, order_, h, w, rate);
+        std::array<Pack, n> w;
+        StepEnds ends;
+        ends.h = h;
+        evaluate_departure<true>(c, order_, h, w, ends.rate);
         Pack sum(0.0);
         for (std::size_t i = 0; i < n; ++i) {
             const Pack rate0 = c[n + i];
-            two_sum(x0_[i], h * rate0 + (w[i] + remainder_[i]), x1[i], remainder[i]);
-            rate[i] = rate0 + rate[i];
-            sum += 0.0 * (x1[i] + rate[i]);
+            two_sum(x0_[i], h * rate0 + (w[i] + remainder_[i]), ends.x[i], ends.remainder[i]);
+            ends.rate[i] = rate0 + ends.rate[i];
+            sum += 0.0 * (ends.x[i] + ends.rate[i]);
         }
         fine = fine & (sum == 0.0);
-        Pack g1 = g0_;
+        ends.g = g0_;
         if constexpr (guarded) {
-            sample_guards(x1, start_ + (start_remainder_ + in_time(h)), g1, fine);
-            fine = fine & clears(h, g1);
+            sample_guards(ends.x, start_ + (start_remainder_ + in_time(h)), ends.g, fine);
+            fine = fine & clears(h, ends.g);
         }
-        accept(fine, h, x1, remainder, rate, g1);
+        accept(fine, ends);
         return fine;
     }
 
@@ -400,26 +401,23 @@ private:
         const Pack q0 = sign_ * g0_;
         const Mask armed = (sign_ * g1 > 0.0) & ~(~departs_ & (q0 < 0.0));
         const Mask from_surface = departs_ | (q0 <= 0.0);
-        return (armed & converges) & series_clears(g, order_, sign_, h, last, from_surface);
+        return (armed & converges) & series_clears(g, order_, sign_, h, from_surface);
     }
 
-    [[gnu::always_inline]] void accept(const Mask& fine, const Pack& h,
-                                       const std::array<Pack, n>& x1,
-                                       const std::array<Pack, n>& remainder,
-                                       const std::array<Pack, n>& rate1, const Pack& g1)
+    [[gnu::always_inline]] void accept(const Mask& fine, const StepEnds& ends)
     {
         Pack start, start_remainder;
-        two_sum(start_, start_remainder_ + in_time(h), start, start_remainder);
+        two_sum(start_, start_remainder_ + in_time(ends.h), start, start_remainder);
         start_ = select(fine, start, start_);
         start_remainder_ = select(fine, start_remainder, start_remainder_);
         for (std::size_t i = 0; i < n; ++i) {
-            x0_[i] = select(fine, x1[i], x0_[i]);
-            remainder_[i] = select(fine, remainder[i], remainder_[i]);
-            rate0_[i] = select(fine, rate1[i], rate0_[i]);
+            x0_[i] = select(fine, ends.x[i], x0_[i]);
+            remainder_[i] = select(fine, ends.remainder[i], remainder_[i]);
+            rate0_[i] = select(fine, ends.rate[i], rate0_[i]);
         }
-        h_ = select(fine, h, h_);
-        h_next_ = select(fine, smaller_of(10.0 * h, options_.h_max), h_next_);
-        g0_ = select(fine, g1, g0_);
+        h_ = select(fine, ends.h, h_);
+        h_next_ = select(fine, smaller_of(10.0 * ends.h, options_.h_max), h_next_);
+        g0_ = select(fine, ends.g, g0_);
         departs_ = departs_ & ~fine;
         steps_ = select(fine, steps_ + 1.0, steps_);
     }

@@ -55,14 +55,28 @@ inline constexpr int least_taylor_order = 12;
 /// of two, one of them vanishes, and they say little about the terms that the series omits.
 inline constexpr double most_apart = 0.585;
 
-/// The largest h at which the last two terms stay within atol + rtol |x|.
-/// @param each  absolute tolerances of the components in the place of `atol`, or null
+/// Errors allowed in the components of a state x: atol + rtol |x|.
+struct Tolerances {
+    double rtol = 0;
+    double atol = 0;
+    const double* each = nullptr;  ///< of the components, in the place of `atol`, or null
+
+    [[nodiscard]] double absolute(std::size_t i) const noexcept { return each ? each[i] : atol; }
+};
+
+/// How far the series of a step reaches.
+/// @tparam S, B  double and bool, or several
+template <class S, class B>
+struct SeriesReach {
+    S h;      ///< [s] at which the last two terms are within the tolerances
+    B agree;  ///< whether the last two terms agree, see `most_apart`
+};
+
+/// The largest h at which the last two terms stay within the tolerances.
 /// @param size  scratch, of the size of the state
-/// @param doubtful  whether the last two terms disagree, see `most_apart`
 template <class X, class Array>
-[[nodiscard, gnu::always_inline]] inline double find_reach(const X& x0, const double* each,
-                                                           const double* c, int order, double rtol,
-                                                           double atol, Array& size, bool& doubtful)
+[[nodiscard, gnu::always_inline]] inline SeriesReach<double, bool> find_reach(
+    const X& x0, const double* c, int order, const Tolerances& allowed, Array& size)
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     const std::size_t n = size.size();
@@ -72,7 +86,7 @@ template <class X, class Array>
         double last = 0, before = 0;
         const double* const cp = c + static_cast<std::size_t>(order) * n;
         for (std::size_t i = 0; i < n; ++i) {
-            const double scale = 1 / ((each ? each[i] : atol) + rtol * size[i]);
+            const double scale = 1 / (allowed.absolute(i) + allowed.rtol * size[i]);
             last = std::max(last, std::fabs(cp[i]) * scale);
             before = std::max(before, std::fabs(cp[i - n]) * scale);
         }
@@ -101,8 +115,7 @@ template <class X, class Array>
         if (!larger || !(h < infinity)) break;
         h = longest();
     }
-    doubtful = !(apart <= most_apart);
-    return h;
+    return {h, apart <= most_apart};
 }
 
 /// Identity of the step for which coefficients were computed.

@@ -75,9 +75,8 @@ struct Bernstein {
     static constexpr Evidence evidence = Evidence::proved;  ///< for steps without armed guards
 
     /// Returns true: every step needs a check.
-    [[nodiscard]] static constexpr bool suspects(double sign, double /*g0*/, double /*rate0*/,
-                                                 double /*g1*/, double /*rate1*/,
-                                                 double /*h*/) noexcept
+    [[nodiscard]] static constexpr bool suspects(double sign, const GuardSample& /*start*/,
+                                                 const GuardSample& /*end*/) noexcept
     {
         return sign != 0;
     }

@@ -22,10 +22,10 @@ struct Ends {
 
     /// Whether a step needs a check, from the guard times `sign`, which is positive on its
     /// armed side.
-    [[nodiscard]] static constexpr bool suspects(double sign, double /*g0*/, double /*rate0*/,
-                                                 double g1, double /*rate1*/, double /*h*/) noexcept
+    [[nodiscard]] static constexpr bool suspects(double sign, const GuardSample& /*start*/,
+                                                 const GuardSample& end) noexcept
     {
-        return !(sign * g1 > 0);
+        return !(sign * end.value > 0);
     }
 
     /// Whether the interval holds one crossing and nothing else, as far as its ends tell.
@@ -70,16 +70,15 @@ struct Extremum {
     ///
     /// The expression has no branches and shares its terms with `CubicCheck`, so that a loop over
     /// many guards is vectorised.
-    [[nodiscard, gnu::always_inline]] static constexpr bool suspects(double sign, double g0,
-                                                                     double rate0, double g1,
-                                                                     double rate1,
-                                                                     double h) noexcept
+    [[nodiscard, gnu::always_inline]] static constexpr bool suspects(
+        double sign, const GuardSample& start, const GuardSample& end) noexcept
     {
-        const double slope0 = rate0 * (h / 3);
-        const double slope1 = rate1 * (h / 3);
-        const double b1 = sign * (g0 + slope0);
-        const double b2 = sign * (g1 - slope1);
-        const double v1 = sign * g1;
+        const double third = (end.s - start.s) / 3;
+        const double slope0 = start.rate * third;
+        const double slope1 = end.rate * third;
+        const double b1 = sign * (start.value + slope0);
+        const double b2 = sign * (end.value - slope1);
+        const double v1 = sign * end.value;
         const double lowest = std::min(std::min(b1, b2), v1);
         const double highest = std::max(std::max(b1, b2), v1);
         const bool turns = (sign * slope0 <= 0) & (sign * slope1 > 0);

@@ -106,10 +106,10 @@ public:
                !classifier_->alarm(classifier_->logit(input.data()));
     }
 
-    [[nodiscard]] static constexpr bool suspects(double sign, double g0, double rate0, double g1,
-                                                 double rate1, double h) noexcept
+    [[nodiscard]] static constexpr bool suspects(double sign, const GuardSample& start,
+                                                 const GuardSample& end) noexcept
     {
-        return Ends::suspects(sign, g0, rate0, g1, rate1, h);
+        return Ends::suspects(sign, start, end);
     }
 
     /// Returns true: a prediction may have been late, so that every event is examined carefully.
