@@ -178,9 +178,14 @@ private:
     template <class Loop>
     [[nodiscard]] bool follows_held(const Place& before, const Loop& simulation)
     {
+        const typename Modes::Vector now = Modes::vector(simulation.x());
         const double fraction =
-            held_.fraction(modes_, before.mode, before.t, before.w, simulation.t(),
-                           Modes::vector(simulation.x()), options_.event_tolerance);
+            held_.fraction(modes_, {.mode = before.mode,
+                                    .t0 = before.t,
+                                    .t1 = simulation.t(),
+                                    .w0 = before.w,
+                                    .w1 = now,
+                                    .event_tolerance = options_.event_tolerance});
         if (held_.starts_beyond()) return false;
         if (fraction == 1) return true;
         const double shorter = fraction * (simulation.t() - before.t);

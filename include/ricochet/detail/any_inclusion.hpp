@@ -58,6 +58,11 @@ public:
     using Flow = BranchFlow<AnyInclusion, Terms,
                             std::make_index_sequence<static_cast<std::size_t>(N > 0 ? N : 0)>>;
     using StepInputs = std::array<double, StepView::state_inputs>;
+    /// Motion in a mode of branches, where the bounds are those of `branch_bounds`.
+    struct BranchMotion {
+        State rate;
+        Reaction reaction, lower, upper;
+    };
 
     explicit AnyInclusion(const InclusionTraits& of) : traits(of) {}
     virtual ~AnyInclusion() = default;
@@ -91,9 +96,8 @@ public:
     /// The flow, in which every held y that is a component is at rest to the last bit; null for
     /// systems without such modes. `diagonal`: A is diagonal.
     [[nodiscard]] virtual typename Flow::Function branch_flow(bool diagonal) const = 0;
-    /// The rate of the motion, the reactions, and `branch_bounds`.
-    virtual void branch_state(const Terms& terms, Mode mode, double t, const State& w, State& rate,
-                              Reaction& r, Reaction& lower, Reaction& upper) const = 0;
+    virtual void branch_state(const Terms& terms, Mode mode, double t, const State& w,
+                              BranchMotion& out) const = 0;
     virtual void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const = 0;
     [[nodiscard]] virtual std::string fault(double t, const State& w) const = 0;
     [[nodiscard]] virtual std::size_t set_dimension(double t, const State& w) const = 0;
@@ -277,8 +281,8 @@ public:
     [[gnu::always_inline]] void flow(const Terms& terms, Mode mode, double t, const State& w,
                                      State& rate) const
     {
-        Reaction r;
-        reactions(terms, mode, t, w, rate, r, diagonal);
+        free_rate<diagonal>(terms, t, w, rate);
+        const Reaction r = reactions(terms, mode, t, w, rate);
         add_reactions(terms, r, rate);
         for (Eigen::Index i = 0; i < r.size(); ++i, mode /= 3) {
             if (branch_of_first(mode) != Branch::inside || terms.selected[i] < 0) continue;
@@ -287,19 +291,23 @@ public:
                                [&](auto k) { set_where(k == terms.selected[i], still, rate[k]); });
         }
     }
-    void branch_state(const Terms& terms, Mode mode, double t, const State& w, State& rate,
-                      Reaction& r, Reaction& lower, Reaction& upper) const override
+    void branch_state(const Terms& terms, Mode mode, double t, const State& w,
+                      typename Any::BranchMotion& out) const override
     {
         if constexpr (branching) {
             // Works on copies, since the output may overlap the input.
             const State at = by_components(w.data());
             State motion;
-            Reaction acting;
-            reactions(terms, mode, t, at, motion, acting, terms.diagonal);
+            if (terms.diagonal) {
+                free_rate<true>(terms, t, at, motion);
+            } else {
+                free_rate<false>(terms, t, at, motion);
+            }
+            const Reaction acting = reactions(terms, mode, t, at, motion);
             add_reactions(terms, acting, motion);
-            for_each_component(motion, [&](auto i) { rate[i] = motion[i]; });
-            r = acting;
-            branch_bounds(t, at, lower, upper);
+            for_each_component(motion, [&](auto i) { out.rate[i] = motion[i]; });
+            out.reaction = acting;
+            branch_bounds(t, at, out.lower, out.upper);
         }
     }
     void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const override
@@ -381,20 +389,28 @@ private:
         return rate;
     }
 
-    /// Writes A^-1 f and the reactions in a mode.
-    [[gnu::always_inline]] void reactions(const Terms& terms, const Mode mode, double t,
-                                          const State& w, State& free, Reaction& r,
-                                          bool diagonal) const
+    /// Writes A^-1 f.
+    template <bool diagonal>
+    [[gnu::always_inline]] void free_rate(const Terms& terms, double t, const State& w,
+                                          State& free) const
     {
         State f;
         system.smooth(t, w, f);
-        if (diagonal) {
+        if constexpr (diagonal) {
             for_each_component(f, [&](auto i) { free[i] = terms.inverse_diagonal[i] * f[i]; });
         } else {
             const State force = copied(f);
             const State out = terms.inverse_mass.lazyProduct(force);
             free = by_components(out.data());
         }
+    }
+
+    /// The reactions in a mode, where the rate without them is `free`.
+    [[nodiscard, gnu::always_inline]] Reaction reactions(const Terms& terms, const Mode mode,
+                                                         double t, const State& w,
+                                                         const State& free) const
+    {
+        Reaction r;
         std::size_t held = 0;
         Mode rest = mode;
         for (Eigen::Index i = 0; i < r.size(); ++i, rest /= 3) {
@@ -402,7 +418,7 @@ private:
             if (at == Branch::inside) held |= std::size_t{1} << i;
             r[i] = at == Branch::inside ? 0 : TypedInclusion::bound(t, w, i, at);
         }
-        if (held == 0) return;
+        if (held == 0) return r;
         if constexpr (reaction_size<System> == 1) {
             const Eigen::Index k = terms.selected[0];
             double rate = 0;
@@ -425,6 +441,7 @@ private:
             if constexpr (moves) rate -= rate_of_offset(t);
             r -= terms.holds[held].inverse.lazyProduct(rate);
         }
+        return r;
     }
 
     /// A^-1 (f + G r) from A^-1 f.

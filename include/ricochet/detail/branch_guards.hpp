@@ -13,12 +13,11 @@
 namespace ricochet::detail {
 
 template <int N, int M>
-void AnyModes<N, M>::rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r,
-                           Rooms& rooms) const
+void AnyModes<N, M>::rooms(Mode mode, double t, const Vector& w, Motion& motion, Rooms& rooms) const
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    Reaction lower, upper;
-    matrices_.inclusion().branch_state(terms_, mode, t, w, rate, r, lower, upper);
+    matrices_.inclusion().branch_state(terms_, mode, t, w, motion);
+    const Reaction &r = motion.reaction, &lower = motion.lower, &upper = motion.upper;
     Mode rest = mode;
     for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
         const auto k = static_cast<std::size_t>(i);

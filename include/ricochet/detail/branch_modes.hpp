@@ -61,6 +61,7 @@ public:
     using Vector = typename Matrices::State;
     using Reaction = typename Matrices::Reaction;
     using Branches = Eigen::Matrix<Branch, M, 1>;
+    using Motion = typename AnyInclusion<N, M>::BranchMotion;
     using Slacks = std::array<double, 2>;  ///< above the lower bound, below the upper one
     using Rooms = std::array<double, 2 * static_cast<std::size_t>(M)>;  ///< of all reactions
 
@@ -140,7 +141,7 @@ public:
             for_each_component(dxdt, [&](auto i) { dxdt[i] = 0; });
             return;
         }
-        Inclusion::Flow::apply(flow_, matrices_.inclusion(), terms_, mode, t, x, dxdt);
+        typename Inclusion::Flow{flow_, matrices_.inclusion(), terms_}(mode, t, x, dxdt);
     }
 
     /// Reactions and rates in a mode at (t, w).
@@ -151,7 +152,7 @@ public:
 
     /// How far every held reaction is from its bounds; infinite where there is no bound, and for
     /// reactions that are not held. Writes the rate of the motion and the reactions, too.
-    void rooms(Mode mode, double t, const Vector& w, Vector& rate, Reaction& r, Rooms& rooms) const;
+    void rooms(Mode mode, double t, const Vector& w, Motion& motion, Rooms& rooms) const;
 
     /// Change of the held reactions that the rounding of the terms may cause.
     [[nodiscard]] double rounding_of_held(Mode mode, const Vector& rate, const Reaction& r) const
@@ -283,17 +284,10 @@ private:
         return matrices_.inclusion().bound(t, w, i, side);
     }
 
-    /// Motion in a mode: rate, reactions and bounds.
-    struct Motion {
-        Vector rate;
-        Reaction reaction, lower, upper;
-    };
-
     [[nodiscard]] Motion motion(Mode mode, double t, const Vector& w) const
     {
         Motion out;
-        matrices_.inclusion().branch_state(terms_, mode, t, w, out.rate, out.reaction, out.lower,
-                                           out.upper);
+        matrices_.inclusion().branch_state(terms_, mode, t, w, out);
         return out;
     }
 
@@ -418,15 +412,16 @@ private:
         if (doubtful == 0) return checked(mode_of(next));
         if (doubtful > 1) return several;
         const bool up = r[which] - inequality.lower[which] > inequality.upper[which] - r[which];
-        return bend(next, which, up, size, t, w);
+        next[which] = up ? Branch::upper : Branch::lower;
+        return bend(next, which, size, t, w);
     }
 
-    /// The mode when reaction i is at one of its bounds and y_i does not move: y_i leaves zero if
+    /// The mode when reaction i is at its bound in `next` and y_i does not move: y_i leaves zero if
     /// it bends away by more than the rounding of its `terms`, and is held otherwise.
-    [[nodiscard]] Mode bend(Branches next, Eigen::Index i, bool up, double terms, double t,
+    [[nodiscard]] Mode bend(Branches next, Eigen::Index i, double terms, double t,
                             const Vector& w) const
     {
-        next[i] = up ? Branch::upper : Branch::lower;
+        const bool up = next[i] == Branch::upper;
         const Mode leaving = mode_of(next);
         State x;
         State dxdt;

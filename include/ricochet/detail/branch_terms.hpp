@@ -104,11 +104,13 @@ struct BranchFlow<Inclusion, Terms, std::index_sequence<I...>> {
         return two;
     }
 
-    /// Calls `function` at (t, x).
+    Function function;
+    const Inclusion& inclusion;
+    const Terms& terms;
+
+    /// Calls the function at (t, x).
     template <class X>
-    [[gnu::always_inline]] static void apply(Function function, const Inclusion& inclusion,
-                                             const Terms& terms, Mode mode, double t, const X& x,
-                                             X& rate)
+    [[gnu::always_inline]] void operator()(Mode mode, double t, const X& x, X& rate) const
     {
         std::array<double, std::max<std::size_t>(sizeof...(I), 3) - 2> more;
         const FirstRates two = function(inclusion, terms, mode, t, x[I]..., more.data());

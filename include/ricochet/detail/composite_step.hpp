@@ -116,7 +116,7 @@ public:
 private:
     [[nodiscard]] StageReport composite(const State& from, double h, State& to)
     {
-        StageReport first = one_stage(from, h / 2, 0.5, 2 / h, middle_);
+        StageReport first = one_stage(from, {.span = h / 2, .theta = 0.5, .c = 2 / h}, middle_);
         if (!first.converged) return first;
         stage_.t = from.t + h;
         stage_.c = 3 / h;
@@ -132,13 +132,18 @@ private:
         return second;
     }
 
-    /// One stage of `span` with the weights theta and 1 - theta.
-    [[nodiscard]] StageReport one_stage(const State& from, double span, double theta, double c,
-                                        State& to)
+    /// A stage with the weights theta and 1 - theta.
+    struct ThetaStage {
+        double span;  ///< [s]
+        double theta;
+        double c;  ///< [1/s]
+    };
+
+    [[nodiscard]] StageReport one_stage(const State& from, const ThetaStage& stage, State& to)
     {
         matrices_.smooth(from.t, from.w, f_);
-        const bool averages = options_.first_stage != FirstStage::at_end && theta < 1;
-        StageReport report = attempt(from, span, theta, c, averages, to);
+        const bool averages = options_.first_stage != FirstStage::at_end && stage.theta < 1;
+        StageReport report = attempt(from, stage, averages, to);
         if (matrices_.traits().box && averages && report.converged && !frozen_ &&
             options_.first_stage == FirstStage::switch_aware) {
             Branches before = branches_;
@@ -147,16 +152,17 @@ private:
             branches_of(to, after);
             if (before != after) {
                 const int spent = report.iterations;
-                report = attempt(from, span, theta, c, false, to);
+                report = attempt(from, stage, false, to);
                 report.iterations += spent;
             }
         }
         return report;
     }
 
-    [[nodiscard]] StageReport attempt(const State& from, double span, double theta, double c,
-                                      bool averages, State& to)
+    [[nodiscard]] StageReport attempt(const State& from, const ThetaStage& stage, bool averages,
+                                      State& to)
     {
+        const auto [span, theta, c] = stage;
         stage_.t = from.t + span;
         stage_.c = c;
         stage_.kappa = theta;
@@ -174,12 +180,12 @@ private:
     {
         if (frozen_) {
             branches_ = *frozen_;
-            return solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction, branches_,
-                               true);
+            return StageCases(scratch_, stage_, branches_, true)
+                .solve(options_.stage, to.w, to.reaction);
         }
         if (method_ == StageMethod::cases) {
             branches_.setConstant(Branch::inside);
-            return solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction, branches_);
+            return StageCases(scratch_, stage_, branches_).solve(options_.stage, to.w, to.reaction);
         }
         if (method_ == StageMethod::fixed_point) {
             return solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
@@ -200,7 +206,8 @@ private:
         StageReport report;
         if (matrices_.traits().box) {
             branches_.setConstant(Branch::inside);
-            report = solve_cases(scratch_, stage_, options_.stage, to.w, to.reaction, branches_);
+            report =
+                StageCases(scratch_, stage_, branches_).solve(options_.stage, to.w, to.reaction);
         } else {
             report = solve_fixed_point(scratch_, stage_, options_.stage, to.w, to.reaction);
         }
@@ -254,7 +261,7 @@ StageReport AnyStep<N, M>::take(const State& from, double h, State& to, const Br
     frozen_ = frozen;
     if (options_.scheme == Scheme::bathe) return composite(from, h, to);
     const double theta = options_.scheme == Scheme::theta ? options_.theta : 1;
-    return one_stage(from, h, theta, 1 / h, to);
+    return one_stage(from, {.span = h, .theta = theta, .c = 1 / h}, to);
 }
 
 template <int N, int M>

@@ -17,38 +17,50 @@
 
 namespace ricochet::detail {
 
+/// A step in a mode.
+template <class Vector>
+struct HeldStep {
+    Mode mode;
+    double t0, t1;  ///< [s] its ends
+    const Vector &w0, &w1;
+    double event_tolerance;  ///< [s] by which it may pass an exit
+
+    [[nodiscard]] double h() const noexcept { return t1 - t0; }
+};
+
 /// Remembers the end of the last step, which is the start of the next one.
 template <int N, int M>
 class RICOCHET_ALIGNED HeldReactions {
     using Modes = AnyModes<N, M>;
     using Vector = typename Modes::Vector;
+    using Step = HeldStep<Vector>;
+    using Motion = typename Modes::Motion;
     using Rooms = typename Modes::Rooms;
 
 public:
-    /// The fraction of the step from (t0, w0) to (t1, w1) in `mode` that would follow the
-    /// reactions; 1 if the step does.
-    [[nodiscard]] double fraction(const Modes& modes, Mode mode, double t0, const Vector& w0,
-                                  double t1, const Vector& w1, double event_tolerance)
+    /// The fraction of a step that would follow the reactions; 1 if the step does.
+    [[nodiscard]] double fraction(const Modes& modes, const Step& step)
     {
         starts_beyond_ = false;
-        if (!(t1 > t0)) return 1;
-        const double h = t1 - t0;
-        const bool goes_on = end_.t == t0 && end_.mode == mode;
-        if (!goes_on) evaluate(modes, mode, t0, w0, h, end_);
+        if (!(step.t1 > step.t0)) return 1;
+        const double h = step.h();
+        const bool goes_on = end_.t == step.t0 && end_.mode == step.mode;
+        end_.mode = step.mode;
+        if (!goes_on) evaluate(modes, step.t0, step.w0, h, end_);
         start_ = end_;
-        evaluate(modes, mode, t1, w1, -h, end_);
+        evaluate(modes, step.t1, step.w1, -h, end_);
         // A step that is much longer than the one before could agree by accident.
         const double growth = goes_on ? h / length_ : std::numeric_limits<double>::infinity();
         if (growth > 2) {
             // The deviation grows with the fourth power of the step.
             const double foreseen = goes_on ? worst_ * (growth * growth) * (growth * growth) : 0;
             worst_ = foreseen > 8 ? foreseen : 0;
-            compare(modes, mode, t0, w0, h, w1, 0.13711, event_tolerance);
-            compare(modes, mode, t0, w0, h, w1, 0.78934, event_tolerance);
+            compare(modes, step, 0.13711);
+            compare(modes, step, 0.78934);
         } else {
             worst_ = 0;
         }
-        compare(modes, mode, t0, w0, h, w1, 0.38196601125010515, event_tolerance);
+        compare(modes, step, 0.38196601125010515);
         length_ = h;
         return worst_ <= 1 ? 1 : std::clamp(0.8 / std::sqrt(std::sqrt(worst_)), 0.1, 0.5);
     }
@@ -69,19 +81,19 @@ private:
     struct End {
         double t = std::numeric_limits<double>::quiet_NaN();
         Mode mode = 0;
-        Vector rate;
+        Motion motion;
         Rooms rooms{}, change{};
     };
 
-    /// `ahead`: the step, with its sign as seen from this end.
-    void evaluate(const Modes& modes, Mode mode, double t, const Vector& w, double ahead, End& end)
+    /// Evaluates an end of a step in its mode. `ahead`: the step, with its sign as seen from this
+    /// end.
+    void evaluate(const Modes& modes, double t, const Vector& w, double ahead, End& end)
     {
         end.t = t;
-        end.mode = mode;
-        modes.rooms(mode, t, w, end.rate, reaction_, end.rooms);
+        modes.rooms(end.mode, t, w, end.motion, end.rooms);
         const double step = nudge * ahead;
-        move(inside_, w, step, end.rate);
-        modes.rooms(mode, t + step, inside_, rate_, reaction_, end.change);
+        move(inside_, w, step, end.motion.rate);
+        modes.rooms(end.mode, t + step, inside_, motion_, end.change);
         for (std::size_t k = 0; k < end.rooms.size(); ++k) {
             const double change = (end.change[k] - end.rooms[k]) / step;
             end.change[k] = std::isfinite(change) ? change : 0;
@@ -89,16 +101,16 @@ private:
     }
 
     /// Compares the distances to the bounds at s within the step with their cubics.
-    void compare(const Modes& modes, Mode mode, double t0, const Vector& w0, double h,
-                 const Vector& w1, double s, double event_tolerance)
+    void compare(const Modes& modes, const Step& step, double s)
     {
+        const double h = step.h();
         const std::array<double, 4> at = hermite(s);
         // One component at a time, as they were written: see components.hpp.
         for_each_component(inside_, [&](auto i) {
-            inside_[i] =
-                at[0] * w0[i] + at[1] * w1[i] + h * (at[2] * start_.rate[i] + at[3] * end_.rate[i]);
+            inside_[i] = at[0] * step.w0[i] + at[1] * step.w1[i] +
+                         h * (at[2] * start_.motion.rate[i] + at[3] * end_.motion.rate[i]);
         });
-        modes.rooms(mode, t0 + s * h, inside_, rate_, reaction_, rooms_);
+        modes.rooms(step.mode, step.t0 + s * h, inside_, motion_, rooms_);
         double rounding = -1;
         for (std::size_t k = 0; k < rooms_.size(); ++k) {
             if (std::isinf(rooms_[k])) continue;
@@ -110,12 +122,13 @@ private:
             if (off <= 1e-9 * size && least > 0) continue;
             if (rounding < 0) {
                 // A difference over `nudge` of the step magnifies rounding by this factor.
-                rounding = modes.rounding_of_held(mode, rate_, reaction_) * (0.01 / nudge);
+                rounding = modes.rounding_of_held(step.mode, motion_.rate, motion_.reaction) *
+                           (0.01 / nudge);
             }
             const double negligible = std::max(1e-9 * size, rounding);
             // An exit that is an event lies beyond the bound by up to the event's tolerance.
             const double beyond = 1e-6 * size + rounding;
-            const double at_end = 2 * event_tolerance * std::abs(end_.change[k]) + beyond;
+            const double at_end = 2 * step.event_tolerance * std::abs(end_.change[k]) + beyond;
             starts_beyond_ = starts_beyond_ || ends[0] < -beyond;
             if (rooms_[k] < -negligible || ends[1] < -at_end) {
                 worst_ = std::max(worst_, missed);
@@ -163,8 +176,8 @@ private:
     static constexpr double missed = 256;
 
     End start_, end_;
-    Vector inside_, rate_;
-    typename Modes::Reaction reaction_;
+    Vector inside_;
+    Motion motion_;
     Rooms rooms_{};
     double worst_ = 0;
     double length_ = 0;
