@@ -190,9 +190,9 @@ template <class Pair>
         const double h = 1e-3;
         const double x = v * h;
         const IncrementalStart start{
-            .x = 0, .x_before = -0.7 * x, .xi = xi - 1e-3 * unit(random), .load = 1e-4};
+            .x = 0, .x_before = -0.7 * x, .xi = xi - 1e-3 * unit(random), .load = 1e-4, .h = h};
         const double slip_rate = (x - start.x) / h;
-        const IncrementalJet j = incremental_potential(pair, block, start, h, x, xi);
+        const IncrementalJet j = incremental_potential(pair, block, start, x, xi);
         const Quad inertia = (Quad(x) - 2 * Quad(start.x) + Quad(start.x_before)) / (Quad(h) * h);
         const Quad spring = Quad(block.stiffness) * (Quad(start.load) - Quad(x));
         const Quad grip = Quad(block.normal_force) * law.friction(slip_rate, xi);

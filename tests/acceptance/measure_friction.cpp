@@ -440,13 +440,13 @@ Measured bound_convexity()
         const double h = largest_convex_step(p, block) * (1 - 1e-9) * unit(random);
         const double v = p.v_star * std::exp(40 * unit(random) - 28);
         const double xi = -10 + 40 * unit(random);
-        const auto j = incremental_potential(pair, block, {.xi = xi}, h, v * h, xi);
+        const auto j = incremental_potential(pair, block, {.xi = xi, .h = h}, v * h, xi);
         below += !(convexity_margin(j) > 0);
     }
     const SpringBlock block{.stiffness = 1e4};
     const double h = 1.01 * largest_convex_step(p, block);
     const double above =
-        convexity_margin(incremental_potential(pair, block, {.xi = 30}, h, 1e3 * h, 30));
+        convexity_margin(incremental_potential(pair, block, {.xi = 30, .h = h}, 1e3 * h, 30));
     return {
         .pass = below == 0 && above < 0,
         .text = fmt::format("{} of {} points not convex below it; at 1.01 of it, V = 1 km/s, xi "

@@ -193,14 +193,14 @@ TEST(IncrementalPotential, IsConvexUpToTheBoundAndNotBeyond)
         const double v = p.v_star * std::exp(log_v(random));
         const double xi = state(random);
         const double h = 0.999 * bound;
-        const auto j = incremental_potential(pair, block, {.xi = xi}, h, v * h, xi);
+        const auto j = incremental_potential(pair, block, {.xi = xi, .h = h}, v * h, xi);
         EXPECT_GT(convexity_margin(j), 0);
         // The closed form of the margin, against the Hessian; both cancel at small V.
         EXPECT_NEAR(convexity_margin(j), ageing_convexity_margin(p, block, h, v, xi), 1e-12);
     }
     // The bound is sharp: fast sliding of an old contact fails one part in a hundred above it.
     const double h = 1.01 * bound;
-    const auto j = incremental_potential(pair, block, {.xi = 30}, h, 1e3 * h, 30);
+    const auto j = incremental_potential(pair, block, {.xi = 30, .h = h}, 1e3 * h, 30);
     EXPECT_LT(convexity_margin(j), 0);
     EXPECT_EQ(largest_convex_step(p, {.stiffness = 2e5}), std::numeric_limits<double>::infinity());
 }

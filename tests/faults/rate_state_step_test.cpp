@@ -48,12 +48,12 @@ TEST(VariationalStep, IsAMinimumOfTheIncrementalPotential)
         const double v0 = 1e-4 * std::exp(14 * unit(random) - 9);
         SliderState s{.x = 0, .v = v0, .xi = 12 * unit(random) - 2};
         const double load = 3e-4 * unit(random);
-        const IncrementalStart start{.x = 0, .x_before = -v0 * h, .xi = s.xi, .load = load};
+        const IncrementalStart start{.x = 0, .x_before = -v0 * h, .xi = s.xi, .load = load, .h = h};
         const VariationalStep<AgeingLaw<>> step(law, block, 1);
         const StepReport report = step.take(s, h, [&](double) { return load; });
         ASSERT_TRUE(report.solved());
         EXPECT_EQ(report.not_convex, 0);
-        const IncrementalJet j = incremental_potential(pair, block, start, h, s.x, s.xi);
+        const IncrementalJet j = incremental_potential(pair, block, start, s.x, s.xi);
         // The search stops at 1e-13 in log V, the potential is evaluated at x / h.
         EXPECT_NEAR(j.x, 0, 1e-11 * (block.mass * v0 / h + normal_force));
         const double sides = normal_force * h * 0.016 * (std::abs(s.v) + 1e-4 * std::exp(-s.xi));

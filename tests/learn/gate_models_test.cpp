@@ -177,7 +177,7 @@ TEST(GateRecipe, MakesTheFeaturesThatItNames)
     const auto make = [&](const char* spelled) {
         const GateRecipe recipe = gate_recipe(spelled);
         f.fill(99);
-        gate_features(recipe, shuttle, 1, 3.0, x, f.data());
+        recipe.write(shuttle, 1, 3.0, x, f.data());
         const std::size_t n = feature_count(recipe, shuttle, x);
         EXPECT_EQ(f[n], 99) << spelled;
         return std::vector<double>(f.begin(), f.begin() + static_cast<std::ptrdiff_t>(n));
@@ -189,7 +189,7 @@ TEST(GateRecipe, MakesTheFeaturesThatItNames)
     EXPECT_EQ(make("angles"), (V{std::sin(0.5), std::cos(0.5), -2}));
     EXPECT_EQ(make("state mode(3)"), (V{0.5, -2, 0, 1, 0}));
     const std::array<double, 4> two{0.5, 0.25, -2, 3};
-    gate_features(gate_recipe("chain"), shuttle, 0, 0.0, two, f.data());
+    gate_recipe("chain").write(shuttle, 0, 0.0, two, f.data());
     EXPECT_EQ(V(f.begin(), f.begin() + 6),
               (V{std::sin(0.5), std::cos(0.5), std::sin(0.75), std::cos(0.75), -2, 3}));
     EXPECT_EQ(feature_count(gate_recipe("own"), shuttle, x), 0U);

@@ -113,8 +113,7 @@ public:
     {
         constexpr Places slides = {Place::sliding, Place::sliding};
         Places next = slides;
-        Scratch<X, 2> scratch(x);
-        follow(slides, t, x, scratch[0], scratch[1], [&](double time, const X& later) {
+        follow(slides, t, x, [&](double time, const X& later) {
             const RegionRates rates = around(both, slides, time, later).rates;
             const SlidingShares sliding = sliding_shares(rates);
             const auto& [first, second] = sliding.shares;
@@ -137,8 +136,7 @@ public:
             return rate > 0 && !(a_moment_later(to, t, x, later) < 0);
         }
         double ahead = 0;
-        Scratch<X, 2> scratch(x);
-        const bool clear = follow(to, t, x, scratch[0], scratch[1], [&](double time, const X& at) {
+        const bool clear = follow(to, t, x, [&](double time, const X& at) {
             ahead = later(time, at);
             return std::fabs(ahead) > 4 * negligible<X>;
         });
@@ -183,8 +181,11 @@ public:
     /// Follows a motion along its tangent, over times that grow from almost zero to 1/64
     /// of the longest, until `clear(t, x)` is true.
     template <class X, class Clear>
-    bool follow(const Places& at, double t, const X& x, X& v, X& moved, Clear&& clear) const
+    bool follow(const Places& at, double t, const X& x, const Clear& clear) const
     {
+        Scratch<X, 2> scratch(x);
+        X& v = scratch[0];
+        X& moved = scratch[1];
         flow(at, t, x, v);
         const TimeScales times(t, largest_component(x), largest_component(v));
         const double most = 0x1p-6 * times.longest;

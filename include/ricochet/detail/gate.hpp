@@ -83,7 +83,7 @@ public:
     [[nodiscard]] Answer ask(const System& system, Mode mode, double t, const X& x) const
     {
         std::array<double, GateRecipe::most> features;
-        gate_features(recipe_, system, mode, t, x, features.data());
+        recipe_.write(system, mode, t, x, features.data());
         if (!in_domain(features.data())) return {.outside = true};
         return {.cleared = cleared(features.data())};
     }

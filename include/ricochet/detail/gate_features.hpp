@@ -37,6 +37,10 @@ struct GateRecipe {
     std::size_t modes = 0;  ///< 0: the mode is no feature
 
     friend bool operator==(const GateRecipe&, const GateRecipe&) = default;
+
+    /// Writes the features of a state, `feature_count` numbers.
+    template <class System, class X>
+    void write(const System& system, Mode mode, double t, const X& x, double* out) const;
 };
 
 /// Name as a model spells it, e.g. "state-phase(0.7) mode(3)".
@@ -102,33 +106,31 @@ void angle_features(const X& x, bool chained, double* out) noexcept
 
 }  // namespace detail
 
-/// Writes `feature_count` numbers.
 template <class System, class X>
-void gate_features(const GateRecipe& recipe, const System& system, Mode mode, double t, const X& x,
-                   double* out)
+void GateRecipe::write(const System& system, Mode mode, double t, const X& x, double* out) const
 {
     const auto n = static_cast<std::size_t>(x.size());
     const auto copy = [&] { detail::for_each_component(x, [&](auto i) { out[i] = x[i]; }); };
-    switch (recipe.kind) {
-        case GateRecipe::Kind::state: copy(); break;
-        case GateRecipe::Kind::state_rate:
+    switch (kind) {
+        case Kind::state: copy(); break;
+        case Kind::state_rate:
             copy();
             detail::flow_features(system, mode, t, x, out + n);
             break;
-        case GateRecipe::Kind::state_phase:
+        case Kind::state_phase:
             copy();
-            out[n] = std::sin(recipe.frequency * t);
-            out[n + 1] = std::cos(recipe.frequency * t);
+            out[n] = std::sin(frequency * t);
+            out[n + 1] = std::cos(frequency * t);
             break;
-        case GateRecipe::Kind::angles: detail::angle_features(x, false, out); break;
-        case GateRecipe::Kind::chain: detail::angle_features(x, true, out); break;
-        case GateRecipe::Kind::own:
+        case Kind::angles: detail::angle_features(x, false, out); break;
+        case Kind::chain: detail::angle_features(x, true, out); break;
+        case Kind::own:
             if constexpr (FeaturesOwned<System, X>) system.features(t, x, out);
             break;
     }
-    if (recipe.modes == 0) return;
-    double* const flags = out + feature_count(recipe, system, x) - recipe.modes;
-    for (std::size_t m = 0; m < recipe.modes; ++m) flags[m] = m == mode ? 1 : 0;
+    if (modes == 0) return;
+    double* const flags = out + feature_count(*this, system, x) - modes;
+    for (std::size_t m = 0; m < modes; ++m) flags[m] = m == mode ? 1 : 0;
 }
 
 }  // namespace ricochet

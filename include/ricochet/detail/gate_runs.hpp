@@ -122,7 +122,7 @@ public:
         begin_stage("sampling", events);
         while (out.events < events && out.steps < most && !stopped_) {
             Exact run = start(random);
-            follow(run, out, share, random);
+            follow(run, {out, share, random});
             if (out.events == 0 && out.steps > 2'000'000) break;  // there are none
             // As many clear states are kept as there is room for.
             const double expected =
@@ -250,6 +250,13 @@ private:
         double weight;
     };
 
+    /// Where states are kept, and how many of those without an event in reach.
+    struct Sampling {
+        GateSamples& out;
+        double share;  ///< of the states, in [0, 1]
+        Random& random;
+    };
+
     /// Sets what is reported to the callback about the runs to come.
     void begin_stage(std::string_view stage, std::size_t events)
     {
@@ -303,8 +310,9 @@ private:
     }
 
     /// Advances a run to its end and keeps its states.
-    void follow(Exact& run, GateSamples& out, double share, Random& random)
+    void follow(Exact& run, const Sampling& to)
     {
+        GateSamples& out = to.out;
         out.width = width_;
         pending_.clear();
         std::size_t seen = run.run().events.size();
@@ -318,10 +326,10 @@ private:
                     continue;
                 }
                 ++out.events;
-                settle(events[seen], out, share, random);
+                settle(events[seen], to);
             }
             while (!pending_.empty() && run.t() - pending_.front().t > reach()) {
-                keep(pending_.front(), infinity, infinity, out, share, random);
+                keep(pending_.front(), infinity, infinity, to);
                 pending_.pop_front();
             }
         }
@@ -336,8 +344,7 @@ private:
                       .features = {},
                       .value = 0,
                       .weight = 1};
-        gate_features(training_.recipe, *system_, state.mode, state.t, state.x,
-                      state.features.data());
+        training_.recipe.write(*system_, state.mode, state.t, state.x, state.features.data());
         out.visit({state.features.data(), width_});
         if (training_.kind == GateKind::level) {
             state.value = ricochet::detail::call_guard(*system_, 0, state.mode, state.t, state.x);
@@ -347,32 +354,32 @@ private:
 
     /// Labels the states that led to an event with it.
     template <class E>
-    void settle(const E& event, GateSamples& out, double share, Random& random)
+    void settle(const E& event, const Sampling& to)
     {
         if (pending_.empty()) return;
         const double back = training_.kind == GateKind::horizon ? time_of_return(event) : infinity;
         const bool fatal = back - event.t <= reach();
         for (const Pending& state : pending_) {
             if (state.t > event.t) break;
-            const bool chosen = random.chance(fatal ? 0.25 : 0.005);
+            const bool chosen = to.random.chance(fatal ? 0.25 : 0.005);
             if (chosen && near_.size() < training_.states) {
                 near_.push_back({.t = state.t, .x = state.x, .mode = state.mode});
             }
-            keep(state, event.t - state.t, back - state.t, out, share, random);
+            keep(state, event.t - state.t, back - state.t, to);
         }
         pending_.clear();
     }
 
-    void keep(const Pending& state, double event, double back, GateSamples& out, double share,
-              Random& random)
+    void keep(const Pending& state, double event, double back, const Sampling& to)
     {
         const bool near = training_.kind == GateKind::horizon
                               ? event <= 2 * reach()
                               : state.value <= training_.levels.back();
-        const double kept = near ? std::max(share, std::min(1.0, 4 * share)) : share;
+        const double kept = near ? std::max(to.share, std::min(1.0, 4 * to.share)) : to.share;
         const bool fatal = back <= reach();
-        if (!fatal && !random.chance(kept)) return;
-        out.append({state.features.data(), width_}, event, back, state.value, fatal ? 1 : 1 / kept);
+        if (!fatal && !to.random.chance(kept)) return;
+        to.out.append({state.features.data(), width_}, event, back, state.value,
+                      fatal ? 1 : 1 / kept);
     }
 
     /// Time [s] at which a guard is first seen on its side again after its event, at the end of

@@ -36,18 +36,20 @@ struct IncrementalJet {
     double xx = 0, xxi = 0, xixi = 0;  ///< [N/m], [N], [J]
 };
 
-/// Start of a step.
+/// Start of a step, and its length.
 struct IncrementalStart {
     double x = 0, x_before = 0;  ///< x_n and x_{n-1} [m]
     double xi = 0;               ///< xi_n
     double load = 0;             ///< x_p at the end of the step [m]
+    double h = 0;                ///< length of the step [s]
 };
 
 template <PotentialPair Pair>
 [[nodiscard]] IncrementalJet incremental_potential(const Pair& pair, const SpringBlock& block,
-                                                   const IncrementalStart& start, double h,
-                                                   double x, double xi)
+                                                   const IncrementalStart& start, double x,
+                                                   double xi)
 {
+    const double h = start.h;
     const double stretch = x - start.load;
     const double jerk = (x - 2 * start.x + start.x_before) / h;  // change of the velocity
     const RateStateJet p = pair.rate_potential((x - start.x) / h, xi);

@@ -120,18 +120,26 @@ RICOCHET_INLINE void outputs_together(const T* parameters, std::size_t row, cons
     }
 }
 
+/// Parameters of a layer: its biases, then a row of weights for each input.
+template <class T>
+struct LayerParameters {
+    const T* parameters;
+    std::size_t inputs;
+    std::size_t row;  ///< outputs, padded
+};
+
 /// Outputs `first` ... `row` - 1, as many together as fit in the registers.
 template <class T, class Activation, std::size_t Registers, std::size_t Chains>
-RICOCHET_INLINE void outputs_from(std::size_t first, const T* parameters, std::size_t row,
-                                  const T* x, std::size_t inputs, T* y) noexcept
+RICOCHET_INLINE void outputs_from(std::size_t first, const LayerParameters<T>& layer, const T* x,
+                                  T* y) noexcept
 {
     constexpr std::size_t step = Registers * lanes<T>;
-    for (; first + step <= row; first += step) {
-        outputs_together<T, Activation, Registers, Chains>(parameters + first, row, x, inputs,
-                                                           y + first);
+    for (; first + step <= layer.row; first += step) {
+        outputs_together<T, Activation, Registers, Chains>(layer.parameters + first, layer.row, x,
+                                                           layer.inputs, y + first);
     }
     if constexpr (Registers > 1) {
-        outputs_from<T, Activation, Registers / 2, Chains>(first, parameters, row, x, inputs, y);
+        outputs_from<T, Activation, Registers / 2, Chains>(first, layer, x, y);
     }
 }
 
@@ -141,17 +149,11 @@ template <class T, class Activation>
 RICOCHET_INLINE void dense(const T* parameters, const T* x, std::size_t inputs, std::size_t outputs,
                            T* y) noexcept
 {
-    const std::size_t row = padded<T>(outputs);
+    const LayerParameters<T> layer{parameters, inputs, padded<T>(outputs)};
     switch (chains<T>(outputs)) {
-        case 4:
-            outputs_from<T, Activation, accumulators / 4, 4>(0, parameters, row, x, inputs, y);
-            break;
-        case 2:
-            outputs_from<T, Activation, accumulators / 2, 2>(0, parameters, row, x, inputs, y);
-            break;
-        default:
-            outputs_from<T, Activation, accumulators, 1>(0, parameters, row, x, inputs, y);
-            break;
+        case 4: outputs_from<T, Activation, accumulators / 4, 4>(0, layer, x, y); break;
+        case 2: outputs_from<T, Activation, accumulators / 2, 2>(0, layer, x, y); break;
+        default: outputs_from<T, Activation, accumulators, 1>(0, layer, x, y); break;
     }
 }
 

@@ -271,7 +271,7 @@ public:
     {
         if (which != 0 || mode != 0) return {};
         std::array<double, GateRecipe::most> features;
-        gate_features(recipe_, system, mode, t, x, features.data());
+        recipe_.write(system, mode, t, x, features.data());
         if (!certified_->classifier().in_domain(features.data())) return {.outside = true};
         return {.cleared = std::max(certified_->lower_bound(features.data()), 0.0)};
     }
