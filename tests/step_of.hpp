@@ -1,6 +1,8 @@
 // A step of a method on a system, in the form that the loop uses.
 #pragma once
 
+#include <limits>
+
 #include "core/step.hpp"
 #include "ricochet/detail/door.hpp"
 #include "ricochet/detail/kernels.hpp"
@@ -17,13 +19,15 @@ template <class Method, class System, class X>
 class StepOf : DoorOf<Method, System, X>, public detail::Step<X> {
     static_assert(std::is_same_v<X, detail::CoreState<X>>);
     using At = DoorOf<Method, System, X>;
+    static constexpr double infinity = std::numeric_limits<double>::infinity();
 
 public:
     StepOf(const System& system, double t, const X& x, Mode mode = 0, bool backward = false)
         : At{{system, x}},
           detail::Step<X>({detail::system_table<System, X>,
                            static_cast<detail::Door<System, X>*>(&this->At::door)},
-                          detail::kernel_for<System, X>(Method{}), t, x, mode, backward)
+                          detail::kernel_for<System, X>(Method{}), x,
+                          {.t_start = t, .t_end = backward ? -infinity : infinity, .mode = mode})
     {
     }
 };

@@ -63,7 +63,7 @@ protected:
           meter_(defers_ ? nullptr : setup.detector.metering),
           resolution_(options),
           backward_(options.t_end < options.t_start),
-          step_(system_, *setup.kernel, options.t_start, x0, options.mode, backward_),
+          step_(system_, *setup.kernel, x0, options),
           bank_(system_, BankRules::of(setup.detector, system_), backward_),
           search_(x0, bank_.size(), finders_, resolution_),
           resets_(x0)

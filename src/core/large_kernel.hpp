@@ -90,15 +90,14 @@ class LargeKernel {
          ...);
     }
 
-    /// w after a step of length h, and the flow there if the method has it.
-    static void depart(void* door, State& step, double h, X* k, X& w, X& rate)
+    /// w after a step of length h, from stages that are kept in `k`.
+    static void depart(void* door, State& step, double h, X* k, X& w)
     {
         for (std::size_t i = 0; i < last; ++i) {
             if (k[i].size() != step.x0.size()) k[i] = step.zero;
         }
         take_stages(door, step, h, k, std::make_index_sequence<last>{});
         combine<typename Method::Weights, last, true>(step, h, h, k, w);
-        if constexpr (Method::fsal) flow(door, step, h, rate);
     }
 
     template <class V>
@@ -242,7 +241,8 @@ class LargeKernel {
         step.h = h;
         step.has_middle = false;
         step.asked_alone = 0;
-        depart(door, step, h, step.stages.data(), step.w, step.w_rate1);
+        depart(door, step, h, step.stages.data(), step.w);
+        if constexpr (Method::fsal) flow(door, step, h, step.w_rate1);
         const std::size_t n = step.x0.size();
         if constexpr (!Method::fsal) {
             for (std::size_t i = 0; i < n; ++i) {
@@ -274,8 +274,9 @@ class LargeKernel {
 
     static void depart_only(void* door, State& step, double s, X& w, X& rate)
     {
-        depart(door, step, s, step.large.probed.data(), w, rate);
+        depart(door, step, s, step.large.probed.data(), w);
         if constexpr (Method::fsal) {
+            flow(door, step, s, rate);
             for (std::size_t i = 0; i < rate.size(); ++i) rate[i] -= step.rate0[i];
         }
     }

@@ -18,6 +18,7 @@
 #include "ricochet/detail/instant.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/detail/system_table.hpp"
+#include "ricochet/integrate/options.hpp"
 
 namespace ricochet::detail {
 
@@ -31,10 +32,9 @@ class Step {
     using Dopri5 = RungeKutta<Dopri5Tableau, X>;
 
 public:
-    /// Places the step at (t, x) in `mode` and evaluates the flow there. `backward`:
-    /// time runs backward, and offsets and rates are counted backward as well.
-    Step(const SystemAt<X>& system, const StepKernel<X>& kernel, double t, const X& x, Mode mode,
-         bool backward)
+    /// Places the step at the start of a run from x and evaluates the flow there. Where time runs
+    /// backward, offsets and rates are counted backward as well.
+    Step(const SystemAt<X>& system, const StepKernel<X>& kernel, const X& x, const Options& options)
         : system_(system),
           kernel_(&kernel),
           state_(x),
@@ -45,9 +45,9 @@ public:
           inner_rate_{state_.zero, state_.zero}
     {
         state_.flow = system->flow;
-        state_.start = {t, 0};
-        state_.mode = mode;
-        state_.backward = backward;
+        state_.start = {options.t_start, 0};
+        state_.mode = options.mode;
+        state_.backward = options.t_end < options.t_start;
         arrive();
     }
 

@@ -150,9 +150,9 @@ void Islands::depart_few(const Island& island, double h, bool with_error, const 
     Few end_rate;
     Few error{};
     if (with_error) {
-        Method::template depart<true>(departure, x, h, stages.data(), w, end_rate, error);
+        Method::template depart<true>(departure, x, h, stages.data(), {w, end_rate, error});
     } else {
-        Method::template depart<false>(departure, x, h, stages.data(), w, end_rate, error);
+        Method::template depart<false>(departure, x, h, stages.data(), {w, end_rate, error});
     }
     std::ranges::copy(w, w_.begin());
     std::ranges::copy(end_rate, end_rate_.begin());
@@ -191,9 +191,9 @@ void Islands::depart(const Island& island, double h, bool with_error) const
         for (std::size_t i = 0; i < n; ++i) rate[i] -= island.rate[i];
     };
     if (with_error) {
-        Dopri5::depart<true>(departure, island.x, h, stages_.data(), w_, end_rate_, error_);
+        Dopri5::depart<true>(departure, island.x, h, stages_.data(), {w_, end_rate_, error_});
     } else {
-        Dopri5::depart<false>(departure, island.x, h, stages_.data(), w_, end_rate_, error_);
+        Dopri5::depart<false>(departure, island.x, h, stages_.data(), {w_, end_rate_, error_});
     }
     seen_ = nullptr;
 }

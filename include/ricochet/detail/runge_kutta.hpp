@@ -152,6 +152,15 @@ struct Fehlberg78Tableau {
                                              3.0 / 1400};
 };
 
+/// What a step of a method computes: the departure w, its rate at the end, and the error estimate,
+/// the latter two where the method has them.
+template <class X>
+struct StepDeparture {
+    X& w;
+    X& rate;
+    X& error;
+};
+
 /// One explicit method for states of type X. The caller stores the rates of its stages from the
 /// second on, `k[0]` to `k[kept_stages - 1]`.
 template <class Tableau, class X>
@@ -181,8 +190,8 @@ public:
     /// rate at the end is computed too; `with_error`: so is the error estimate. `like` gives the
     /// size of a state that is sized at run time.
     template <bool with_error, class Flow>
-    [[gnu::always_inline]] static void depart(const Flow& flow, const X& like, double h, X* k, X& w,
-                                              X& rate, X& error)
+    [[gnu::always_inline]] static void depart(const Flow& flow, const X& like, double h, X* k,
+                                              const StepDeparture<X>& to)
     {
         if constexpr (fixed_size<X>() == 0) {
             for (std::size_t i = 0; i < kept_stages; ++i) {
@@ -190,9 +199,9 @@ public:
             }
         }
         inner_stages(flow, h, k, std::make_index_sequence<kept_stages>{});
-        combine<Weights>(h, k, rate, w);
-        if constexpr (fsal) flow(w, rate, h);
-        if constexpr (with_error) estimate(h, k, rate, error);
+        combine<Weights>(h, k, to.rate, to.w);
+        if constexpr (fsal) flow(to.w, to.rate, h);
+        if constexpr (with_error) estimate(h, k, to.rate, to.error);
     }
 
     /// Number of weights of the rates in w on the dense output.

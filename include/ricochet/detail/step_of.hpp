@@ -135,7 +135,7 @@ struct StepOf {
         };
         if constexpr (ours) {
             RungeKutta<typename Stepper::Coefficients, X>::template depart<with_error>(
-                flow, of.zero, s, kept, w, rate, error);
+                flow, of.zero, s, kept, {w, rate, error});
         } else if constexpr (is_fsal<Stepper> && with_error) {
             kept.do_step(flow, of.zero, of.zero, 0.0, w, rate, s, error);
         } else if constexpr (is_fsal<Stepper>) {
