@@ -47,7 +47,8 @@ public:
             std::size_t resetting = 0;
             for (const std::size_t i : fired) resetting += bank[i].info.resets;
             if (resetting > 0) {
-                mode_ = system->reset_set(system.door(), fired, on_time, mode, t, after_);
+                mode_ =
+                    system->reset_set(system.door(), FiredGuards(fired, on_time), mode, t, after_);
                 return;
             }
         } else if (system->reset) {

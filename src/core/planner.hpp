@@ -515,8 +515,9 @@ private:
     /// A lower bound of guard i from a gate; 0: none.
     [[nodiscard]] double ask_level(std::size_t i, const Check& at, Mode mode)
     {
-        const GateAnswer answer = meter_.time_network(
-            [&] { return detector_->level(self_, system_.door(), i, mode, at.t, *at.x); });
+        const GateAnswer answer = meter_.time_network([&] {
+            return detector_->level(self_, system_.door(), {i, mode}, at.t, *at.x);
+        });
         ++asked_;
         outside_ += answer.outside ? 1 : 0;
         checks_[i].refused = !(answer.cleared > 0);

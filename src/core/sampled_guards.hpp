@@ -51,7 +51,7 @@ public:
 
     [[nodiscard]] CoreGuard<X> view(std::size_t i, Mode mode, std::uint64_t& calls) const noexcept
     {
-        return {system_, calls, i, mode, records_[i].info, backward_};
+        return {system_, calls, {i, mode, backward_}, records_[i].info};
     }
 
     /// The rate of guard i, as `sample` computes it.
@@ -98,7 +98,7 @@ protected:
         if (system_->rates) {
             rates_together(at, rates);
         } else if (system_->each_rate && !selective_ && !backward_) {
-            system_->each_rate(system_.door(), at.mode, at.t, at.x, at.dxdt, all(rates));
+            system_->each_rate(system_.door(), {at.mode, at.t, at.x, at.dxdt}, all(rates));
         } else if (!system_->each_rate && !system_->guard_alone) {
             difference(at, rates);
             calls += 2 * size();
@@ -120,8 +120,8 @@ protected:
     void rates_together(const SamplePoint<X>& at, Doubles& rates)
     {
         void* const door = system_.door();
-        if (!backward_) return system_->rates(door, at.mode, at.t, at.x, at.dxdt, all(rates));
-        system_->rates(door, at.mode, at.t, at.x, negated(at.dxdt), all(rates));
+        if (!backward_) return system_->rates(door, {at.mode, at.t, at.x, at.dxdt}, all(rates));
+        system_->rates(door, {at.mode, at.t, at.x, negated(at.dxdt)}, all(rates));
         for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
     }
 

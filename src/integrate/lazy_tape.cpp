@@ -247,24 +247,24 @@ void LazyTape::find_slopes()
     if (has_slope_[i]) slopes_[i * width + static_cast<std::size_t>(k)] = k * own[k];
 }
 
-int LazyTape::compute(double t, const double* x, int order, double* out, double* guards)
+int LazyTape::compute(double t, const double* x, const TaylorCoefficients<double>& to)
 {
-    if (is_polynomial()) order = degree_;
+    const int order = is_polynomial() ? degree_ : to.order;
     const std::size_t n = tape_.states;
-    for (std::size_t i = 0; i < n; ++i) out[i] = coefficients_[i * width] = x[i];
+    for (std::size_t i = 0; i < n; ++i) to.x[i] = coefficients_[i * width] = x[i];
     coefficients_[n * width] = t;
     coefficients_[n * width + 1] = 1;
     for (std::size_t i = n + 1; i < tape_.ops_count; ++i) coefficients_[i * width] = begin(i);
-    advance(0, out, guards);
+    advance(0, to.x, to.guards);
     for (int k = 1; k < order; ++k) {
         for (std::size_t i = 0; i < tape_.ops_count; ++i) compute_at(i, k);
-        advance(k, out, guards);
+        advance(k, to.x, to.guards);
     }
     if (tape_.guards > 0) {
         for (std::size_t i = 0; i < tape_.ops_count; ++i) {
             if (tape_.for_guards[i]) compute_at(i, order);
         }
-        keep_guards(order, guards);
+        keep_guards(order, to.guards);
     }
     return order;
 }

@@ -82,7 +82,7 @@ struct FixedStepFloor : Floor {
 
     void features(const Ball& ball, double* out) const
     {
-        ricochet::features(Recipe::state, BouncingBall({.gravity = gravity}), 0,
+        ricochet::features(Recipe::state, BouncingBall({.gravity = gravity}),
                            BouncingBall::State{ball.u, ball.v}, step, out);
     }
 
@@ -118,7 +118,7 @@ struct AnyStepFloor : Floor {
 
     void features(const Ball& ball, double* out) const
     {
-        ricochet::features(Recipe::ballistic, BouncingBall({.gravity = ball.gravity}), 0,
+        ricochet::features(Recipe::ballistic, BouncingBall({.gravity = ball.gravity}),
                            BouncingBall::State{ball.u, ball.v}, ball.step, out);
     }
 

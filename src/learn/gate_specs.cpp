@@ -91,7 +91,8 @@ double GateSystem::guard_rate(std::size_t which, Mode mode, double t, const Stat
 {
     return std::visit(
         [&](const auto& system) {
-            return ricochet::detail::call_rate(system, which, mode, t, x, dxdt);
+            return ricochet::detail::call_rate(system, which,
+                                               ricochet::detail::Along{mode, t, x, dxdt});
         },
         held_);
 }

@@ -235,7 +235,7 @@ template <class System>
 double rate_of(const System& system, std::size_t which, Mode mode, const typename System::State& x,
                const typename System::State& dxdt)
 {
-    return detail::call_rate(system, which, mode, 0.3, x, dxdt);
+    return detail::call_rate(system, which, detail::Along{mode, 0.3, x, dxdt});
 }
 
 TEST(DualRates, AreThoseOfTheReadySystems)
@@ -262,8 +262,8 @@ TEST(DualRates, AgreeWithOneThatIsWritten)
 {
     const std::array<double, 4> x{1.1, 0.2, -0.3, -1}, f{-0.3, -1, 0.4, 0.6};
     const ThreeBody system;
-    EXPECT_NEAR(detail::rate_by_duals(system, 0, 0, 0.0, 1.0, x, f), system.guard_rate(0.0, x, f),
-                1e-15);
+    EXPECT_NEAR(detail::rate_by_duals(system, 0, detail::Along{Mode{0}, 0.0, x, f}),
+                system.guard_rate(0.0, x, f), 1e-15);
 }
 
 TEST(DualRates, TheCurvatureOfABallIsItsWeight)

@@ -31,7 +31,7 @@ public:
     [[nodiscard]] bool alarm(const BouncingBall& ball, const State& x, double h) const
     {
         std::array<double, 2> row{};
-        features(recipe_, ball, 0, x, h, row.data());
+        features(recipe_, ball, x, h, row.data());
         return classifier_.alarm(classifier_.logit(row.data()));
     }
 

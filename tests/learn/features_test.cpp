@@ -25,7 +25,7 @@ struct Ramp {
 State ballistic(double gravity, const State& x, double h)
 {
     State out{};
-    features(Recipe::ballistic, BouncingBall({.gravity = gravity}), 0, x, h, out.data());
+    features(Recipe::ballistic, BouncingBall({.gravity = gravity}), x, h, out.data());
     return out;
 }
 
@@ -49,7 +49,7 @@ TEST(Features, StateIsTheStateItself)
 {
     const std::vector<double> x{3, -1};
     std::array<double, 2> out{};
-    features(Recipe::state, BouncingBall{}, 0, x, 0.01, out.data());
+    features(Recipe::state, BouncingBall{}, x, 0.01, out.data());
     EXPECT_EQ(out, (std::array<double, 2>{3, -1}));
 }
 
@@ -135,7 +135,7 @@ TEST(Features, SystemWithoutCurvatureOffersTheStateOnly)
     EXPECT_FALSE((offers<Ramp, State>(Recipe::ballistic)));
     EXPECT_TRUE((offers<BouncingBall, State>(Recipe::ballistic)));
     State out{};
-    features(Recipe::ballistic, Ramp{}, 0, State{1, 2}, 0.1, out.data());
+    features(Recipe::ballistic, Ramp{}, State{1, 2}, 0.1, out.data());
     EXPECT_TRUE(std::isnan(out[0]));
     EXPECT_TRUE(std::isnan(out[1]));
 }

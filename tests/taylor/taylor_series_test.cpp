@@ -31,8 +31,8 @@ template <bool unrolled, class System, std::size_t n>
     const TapeMatch match = read_constants<System, n, 0>(system, constants);
     EXPECT_EQ(match, TapeMatch::fits);
     std::array<std::array<double, n>, order + 1> out{};
-    TaylorSeries<tape, order, unrolled>::compute(constants.data(), t, x.data(), order,
-                                                 out[0].data(), nullptr);
+    TaylorSeries<tape, order, unrolled>::compute(constants.data(), t, x.data(),
+                                                 {order, out[0].data(), nullptr});
     return out;
 }
 
@@ -42,13 +42,12 @@ template <class System, std::size_t n>
     const System& system, double t, const std::array<double, n>& x)
 {
     detail::Recording recording;
-    std::array<detail::Recorded, n> at{}, rates{};
     std::vector<int> outputs(n);
-    record_into(system, 0, recording, at, rates, 0, outputs);
+    record_into(system, 0, recording, std::array<detail::Recorded, n>{}, outputs);
     detail::LazyTape tape(n, recording, outputs);
     EXPECT_LE(tape.operations(), (taylor_tape<System, n, 0>.ops.size() - n - 1));
     std::array<std::array<double, n>, order + 1> out{};
-    EXPECT_EQ(tape.compute(t, x.data(), order, out[0].data(), nullptr), order);
+    EXPECT_EQ(tape.compute(t, x.data(), {order, out[0].data(), nullptr}), order);
     return out;
 }
 

@@ -61,8 +61,7 @@ struct DetectorTable {
     bool (*closes)(Self, const GuardBound& from, const GuardBound& to, double tau,
                    double band) = nullptr;
     GateAnswer (*horizon)(Self, void* door, Mode mode, double t, const X& x) = nullptr;
-    GateAnswer (*level)(Self, void* door, std::size_t which, Mode mode, double t,
-                        const X& x) = nullptr;
+    GateAnswer (*level)(Self, void* door, GuardInMode, double t, const X& x) = nullptr;
     double lowest_level = 0;
     const MeterOptions* metering = nullptr;
 };

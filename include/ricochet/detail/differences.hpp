@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/scratch.hpp"
 
 namespace ricochet {
 
@@ -94,11 +95,13 @@ template <class At>
     return sum;
 }
 
-/// The same for a function `at(k, value)` that fills a vector, without allocating:
-/// `first` and `value` are scratch memory.
+/// The same for a function `at(k, value)` that fills a vector, without allocating.
 template <class X, class At>
-void differentiate_into(X& sum, const Stencil& stencil, double h, const At& at, X& first, X& value)
+void differentiate_into(X& sum, const Stencil& stencil, double h, const At& at)
 {
+    Scratch<X, 2> room(sum);
+    X& first = room[0];
+    X& value = room[1];
     at(std::size_t{0}, first);
     for_each_component(sum, [&](auto i) { sum[i] = 0; });
     for (std::size_t k = 1; k < stencil.points; ++k) {

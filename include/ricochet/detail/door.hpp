@@ -133,16 +133,8 @@ class TableOf {
 
     [[nodiscard]] static D& at(void* door) noexcept { return *static_cast<D*>(door); }
     [[nodiscard]] static const System& system(void* door) noexcept { return at(door).system(); }
-    /// Evaluations are counted by the loop.
-    template <class Use>
-    [[gnu::always_inline]] static double with_guard(void* door, std::size_t which, Mode mode,
-                                                    bool backward, const Use& use)
-    {
-        std::uint64_t calls = 0;
-        return use(Guard(system(door), calls, which, mode, Crossing::falling, backward));
-    }
 
-    // --- guards ---
+    // --- guards; evaluations are counted by the loop ---
 
     static void guards(void* door, Mode mode, double t, const C& x, std::span<double> g)
     {
@@ -150,49 +142,47 @@ class TableOf {
     }
     static double guard(void* door, std::size_t which, Mode mode, double t, const C& x)
     {
-        return with_guard(door, which, mode, false,
-                          [&](const Guard& guard) { return guard.value(t, at(door).read(x, 0)); });
+        std::uint64_t calls = 0;
+        return Guard(system(door), calls, {which, mode}).value(t, at(door).read(x, 0));
     }
     static double guard_on(void* door, std::size_t which, Mode mode, double t, const View& x)
     {
-        return with_guard(door, which, mode, false,
-                          [&](const Guard& guard) { return guard.value(t, x); });
+        std::uint64_t calls = 0;
+        return Guard(system(door), calls, {which, mode}).value(t, x);
     }
-    static double rate(void* door, std::size_t which, Mode mode, bool backward, double t,
-                       const C& x, const C& dxdt, double scale)
-    {
-        return with_guard(door, which, mode, backward, [&](const Guard& guard) {
-            return guard.rate(t, at(door).read(x, 0), at(door).read(dxdt, 1), scale);
-        });
-    }
-    static GuardPoint point(void* door, std::size_t which, Mode mode, bool backward, double t,
-                            const C& x, const C& dxdt, double scale)
+    static double rate(void* door, GuardInMode of, ScaledTime time, const C& x, const C& dxdt)
     {
         std::uint64_t calls = 0;
-        const Guard guard(system(door), calls, which, mode, Crossing::falling, backward);
+        return Guard(system(door), calls, of)
+            .rate(time.t, at(door).read(x, 0), at(door).read(dxdt, 1), time.scale);
+    }
+    static GuardPoint point(void* door, GuardInMode of, ScaledTime time, const C& x, const C& dxdt)
+    {
+        std::uint64_t calls = 0;
+        const Guard guard(system(door), calls, of);
         const X& state = at(door).read(x, 0);
-        return {guard.value(t, state), guard.rate(t, state, at(door).read(dxdt, 1), scale)};
+        return {guard.value(time.t, state),
+                guard.rate(time.t, state, at(door).read(dxdt, 1), time.scale)};
     }
-    static double rate_on(void* door, std::size_t which, Mode mode, bool backward, double t,
-                          const View& x, const RateView& dxdt, double scale)
+    static double rate_on(void* door, GuardInMode of, ScaledTime time, const View& x,
+                          const RateView& dxdt)
     {
-        return with_guard(door, which, mode, backward,
-                          [&](const Guard& guard) { return guard.rate(t, x, dxdt, scale); });
+        std::uint64_t calls = 0;
+        return Guard(system(door), calls, of).rate(time.t, x, dxdt, time.scale);
     }
-    static void rates(void* door, Mode mode, double t, const C& x, const C& dxdt,
-                      std::span<double> rates)
+    static void rates(void* door, const Along<C>& motion, std::span<double> rates)
     {
-        call_rates(system(door), mode, t, at(door).read(x, 0), at(door).read(dxdt, 1), rates);
+        const X& state = at(door).read(motion.x, 0);
+        const X& rate = at(door).read(motion.s, 1);
+        call_rates(system(door), Along{motion.mode, motion.t, state, rate}, rates);
     }
-    static void each_rate(void* door, Mode mode, double t, const C& x, const C& dxdt,
-                          std::span<double> rates)
+    static void each_rate(void* door, const Along<C>& motion, std::span<double> rates)
     {
         const System& of = system(door);
-        const X& state = at(door).read(x, 0);
-        const X& rate = at(door).read(dxdt, 1);
-        for (std::size_t i = 0; i < rates.size(); ++i) {
-            rates[i] = call_rate(of, i, mode, t, state, rate);
-        }
+        const X& state = at(door).read(motion.x, 0);
+        const X& rate = at(door).read(motion.s, 1);
+        const Along along{motion.mode, motion.t, state, rate};
+        for (std::size_t i = 0; i < rates.size(); ++i) rates[i] = call_rate(of, i, along);
     }
 
     // --- resets ---
@@ -202,12 +192,10 @@ class TableOf {
         return at(door).edit(
             x, [&](X& state) { return call_reset(system(door), which, mode, t, state); });
     }
-    static Mode reset_set(void* door, std::span<const std::size_t> fired, bool on_time, Mode mode,
-                          double t, C& x)
+    static Mode reset_set(void* door, const FiredGuards& fired, Mode mode, double t, C& x)
     {
-        return at(door).edit(x, [&](X& state) {
-            return call_reset_set(system(door), FiredGuards(fired, on_time), mode, t, state);
-        });
+        return at(door).edit(
+            x, [&](X& state) { return call_reset_set(system(door), fired, mode, t, state); });
     }
     static Mode rest(void* door, std::size_t which, Mode mode, double t, C& x)
     {

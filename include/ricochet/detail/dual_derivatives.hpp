@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/dual_rate.hpp"
 #include "ricochet/detail/scalar_probe.hpp"
 #include "ricochet/detail/scratch.hpp"
 #include "ricochet/dual.hpp"
@@ -67,39 +68,42 @@ template <class System, class S, class X>
     }
 }
 
-/// ds = (df/dx) s + (df/dt) dt.
+/// ds = (df/dx) s + (df/dt) dt along a direction.
 template <class System, class X>
-void flow_by_duals(const System& system, Mode mode, double t, double dt, const X& x, const X& s,
-                   X& ds)
+void flow_by_duals(const System& system, const Along<X>& at, X& ds)
 {
     using D = Dual<1>;
+    const X &x = at.x, &s = at.s;
     Scratch<WithScalar<X, D>, 2> room(x);
     for_each_component(x, [&](auto i) { room[0][static_cast<std::size_t>(i)] = {x[i], {s[i]}}; });
-    flow_of_scalar(system, mode, D(t, {dt}), room[0], room[1]);
+    flow_of_scalar(system, at.mode, D(at.t, {at.dt}), room[0], room[1]);
     for_each_component(x, [&](auto i) { ds[i] = room[1][static_cast<std::size_t>(i)].slope[0]; });
 }
 
-/// ds = (df/dx) s for states of any scalar S.
-template <class System, class S, class Xs>
-void flow_along_by_duals(const System& system, Mode mode, const S& t, const Xs& x, const Xs& s,
-                         Xs& ds)
+/// The slopes of the flow of dual numbers over any scalar S, at a time whose slope is zero.
+template <class System, class S, class Duals, class Xs>
+void flow_along_by_duals(const System& system, Mode mode, const S& t, const Duals& state, Xs& ds)
 {
-    using D = Dual<1, S>;
-    WithScalar<Xs, D> state{}, rate{};
-    if constexpr (fixed_size<Xs>() == 0) {
-        state.resize(x.size());
-        rate.resize(x.size());
-    }
-    for (std::size_t i = 0; i < x.size(); ++i) state[i] = {x[i], {s[i]}};
-    flow_of_scalar(system, mode, D(t, {S(0.0)}), state, rate);
-    for (std::size_t i = 0; i < x.size(); ++i) ds[i] = rate[i].slope[0];
+    Duals rate = state;
+    flow_of_scalar(system, mode, Dual<1, S>(t, {S(0.0)}), state, rate);
+    for (std::size_t i = 0; i < state.size(); ++i) ds[i] = rate[i].slope[0];
 }
 
-/// The state x as dual numbers whose slopes are s.
+/// The state before a reset, and the derivative of its time in the direction in which the reset is
+/// differentiated.
 template <class X>
-[[nodiscard]] WithScalar<X, Dual<1>> dual_state(const X& x, const X& s)
+struct BeforeReset {
+    Mode mode;
+    double t;  ///< [s]
+    double dt;
+    const X& x;
+};
+
+/// The state x as dual numbers whose slopes are s.
+template <class S = double, class X>
+[[nodiscard]] WithScalar<X, Dual<1, S>> dual_state(const X& x, const X& s)
 {
-    WithScalar<X, Dual<1>> state{};
+    WithScalar<X, Dual<1, S>> state{};
     if constexpr (fixed_size<X>() == 0) state.resize(static_cast<std::size_t>(x.size()));
     for_each_component(x, [&](auto i) { state[static_cast<std::size_t>(i)] = {x[i], {s[i]}}; });
     return state;
@@ -115,13 +119,12 @@ void put_slopes(const WithScalar<X, Dual<1>>& state, X& s)
 
 /// s becomes (dR/dx) s + (dR/dt) dt, where R is the reset of a guard or of a set of guards.
 template <class System, class X, class... Which>
-void reset_by_duals(const System& system, [[maybe_unused]] Mode mode, double t, double dt,
-                    const X& x, X& s, const Which&... which)
+void reset_by_duals(const System& system, const BeforeReset<X>& at, X& s, const Which&... which)
 {
-    const Dual<1> time(t, {dt});
-    auto state = dual_state(x, s);
-    if constexpr (requires { system.reset(which..., mode, time, state); }) {
-        static_cast<void>(system.reset(which..., mode, time, state));
+    const Dual<1> time(at.t, {at.dt});
+    auto state = dual_state(at.x, s);
+    if constexpr (requires { system.reset(which..., at.mode, time, state); }) {
+        static_cast<void>(system.reset(which..., at.mode, time, state));
     } else {
         system.reset(which..., time, state);
     }
@@ -130,13 +133,12 @@ void reset_by_duals(const System& system, [[maybe_unused]] Mode mode, double t, 
 
 /// The same for the reset at a time event.
 template <class System, class X>
-void time_reset_by_duals(const System& system, [[maybe_unused]] Mode mode, double t, double dt,
-                         const X& x, X& s)
+void time_reset_by_duals(const System& system, const BeforeReset<X>& at, X& s)
 {
-    const Dual<1> time(t, {dt});
-    auto state = dual_state(x, s);
-    if constexpr (requires { system.time_reset(mode, time, state); }) {
-        static_cast<void>(system.time_reset(mode, time, state));
+    const Dual<1> time(at.t, {at.dt});
+    auto state = dual_state(at.x, s);
+    if constexpr (requires { system.time_reset(at.mode, time, state); }) {
+        static_cast<void>(system.time_reset(at.mode, time, state));
     } else {
         system.time_reset(time, state);
     }
@@ -164,7 +166,7 @@ template <class System, class X>
     X f = x;
     X rate = x;
     system.flow(t, x, f);
-    flow_by_duals(system, 0, t, 1, x, f, rate);
+    flow_by_duals(system, Along{Mode{0}, t, x, f}, rate);
     WithScalar<X, D> state{};
     for_each_component(x, [&](auto i) {
         state[static_cast<std::size_t>(i)] = {{x[i], {f[i]}}, {Dual<1>(f[i], {rate[i]})}};

@@ -13,6 +13,21 @@
 
 namespace ricochet::detail {
 
+/// A state x, or a view of one, at time t, and the direction (dt, s) in which a function of both
+/// is differentiated: along a motion dt = 1 and s = x'.
+template <class X, class D = X>
+struct Along {
+    Mode mode;
+    double t;  ///< [s]
+    const X& x;
+    const D& s;
+    double dt = 1;
+};
+template <class X, class D>
+Along(Mode, double, const X&, const D&) -> Along<X, D>;
+template <class X, class D>
+Along(Mode, double, const X&, const D&, double) -> Along<X, D>;
+
 /// A state and its rate as dual numbers, one component at a time.
 template <class V, class D>
 class DualView {
@@ -37,22 +52,21 @@ concept RateByDuals = GuardOfScalarViews<System> || GuardOfScalarArrays < System
         fixed_size<V>()
 > ;
 
-/// The rate of a guard where x' = dxdt and t' = `clock`.
+/// The rate of a guard along a direction.
 template <class System, class V, class D>
 [[gnu::always_inline]] [[nodiscard]] inline double rate_by_duals(const System& system,
-                                                                 std::size_t which, Mode mode,
-                                                                 double t, double clock, const V& x,
-                                                                 const D& dxdt)
+                                                                 std::size_t which,
+                                                                 const Along<V, D>& at)
 {
-    const Dual<1> time(t, {clock});
+    const Dual<1> time(at.t, {at.dt});
     if constexpr (GuardOfScalarViews<System>) {
-        const DualView<V, D> state(x, dxdt);
-        return guard_of_scalar(system, which, mode, time, state).slope[0];
+        const DualView<V, D> state(at.x, at.s);
+        return guard_of_scalar(system, which, at.mode, time, state).slope[0];
     } else {
         std::array<Dual<1>, fixed_size<V>()> state;
-        const DualView<V, D> view(x, dxdt);
+        const DualView<V, D> view(at.x, at.s);
         for (std::size_t i = 0; i < state.size(); ++i) state[i] = view[i];
-        return guard_of_scalar(system, which, mode, time, state).slope[0];
+        return guard_of_scalar(system, which, at.mode, time, state).slope[0];
     }
 }
 

@@ -113,8 +113,16 @@ namespace detail {
     return std::copysign(static_cast<double>(above_one) * 0x1p-52 + if_nan, a);
 }
 
-/// Computes the features of the step of length h from state x, where the flow is
-/// dxdt.
+/// A step that is still to be taken.
+template <class X>
+struct StepAhead {
+    double t;  ///< [s]
+    const X& x;
+    const X& dxdt;  ///< the flow there
+    double h;       ///< [s] length of the step, positive
+};
+
+/// Computes the features of a step.
 ///
 ///     state       x[0], x[1], ...
 ///     ballistic   slog(g / (|g''| h^2)),  slog(g' / (|g''| h))
@@ -124,38 +132,38 @@ namespace detail {
 /// the surface iff g / (|g''| h^2) + g' / (|g''| h) <= 1/2: one boundary for
 /// every gravity and every step.
 ///
-/// @param h    [s], positive
 /// @param out  `dimension(recipe, x.size())` numbers, written. Finite for finite
 ///             arguments: quotients saturate, even where the curvature is zero.
 ///             NaN for a recipe that the system does not offer.
 template <class System, class X>
-void features(Recipe recipe, const System& system, double t, const X& x, const X& dxdt, double h,
-              double* out) noexcept
+void features(Recipe recipe, const System& system, const StepAhead<X>& step, double* out) noexcept
 {
+    const X& x = step.x;
     if (recipe == Recipe::state) {
         const auto n = static_cast<std::size_t>(x.size());
         for (std::size_t i = 0; i < n; ++i) out[i] = x[i];
         return;
     }
     if constexpr (CurvedGuard<System, X>) {
-        const double per_step = detail::saturated_reciprocal(h);
-        const double per_speed =
-            detail::saturated_reciprocal(std::abs(detail::curvature_of(system, t, x)) * h);
-        out[0] = slog(system.guard(t, x) * per_speed * per_step);
-        out[1] = slog(detail::call_rate(system, 0, 0, t, x, dxdt) * per_speed);
+        const double per_step = detail::saturated_reciprocal(step.h);
+        const double per_speed = detail::saturated_reciprocal(
+            std::abs(detail::curvature_of(system, step.t, x)) * step.h);
+        out[0] = slog(system.guard(step.t, x) * per_speed * per_step);
+        out[1] = slog(detail::call_rate(system, 0, detail::Along{Mode{0}, step.t, x, step.dxdt}) *
+                      per_speed);
     } else {
         out[0] = out[1] = std::numeric_limits<double>::quiet_NaN();
     }
 }
 
-/// Same, with the flow evaluated here, into a copy of the state.
+/// Same for a step of length h from x at time 0, with the flow evaluated here, into a copy of the
+/// state.
 template <class System, class X>
-void features(Recipe recipe, const System& system, double t, const X& x, double h,
-              double* out) noexcept
+void features(Recipe recipe, const System& system, const X& x, double h, double* out) noexcept
 {
     X dxdt = x;
-    if (recipe != Recipe::state) system.flow(t, x, dxdt);
-    features(recipe, system, t, x, dxdt, h, out);
+    if (recipe != Recipe::state) system.flow(0, x, dxdt);
+    features(recipe, system, StepAhead<X>{0, x, dxdt, h}, out);
 }
 
 }  // namespace ricochet

@@ -77,10 +77,9 @@ class DetectorTableOf {
                           detector.level(s, std::size_t{}, Mode{}, 0.0, x);
                       }) {
             table.lowest_level = detector.lowest_level();
-            table.level = [](Self d, void* door, std::size_t which, Mode mode, double t,
-                             const C& x) {
+            table.level = [](Self d, void* door, GuardInMode of, double t, const C& x) {
                 const auto answer =
-                    self(d).level(at(door).system(), which, mode, t, at(door).read(x, 0));
+                    self(d).level(at(door).system(), of.which, of.mode, t, at(door).read(x, 0));
                 return GateAnswer{answer.cleared, answer.outside};
             };
         }
@@ -88,8 +87,8 @@ class DetectorTableOf {
 
     static bool clears(Self detector, void* door, const StepState<C>& step, std::uint64_t& calls)
     {
-        const GuardView<System, X> guard(at(door).system(), calls, 0, step.mode, Crossing::falling,
-                                         step.backward);
+        const GuardView<System, X> guard(at(door).system(), calls,
+                                         {.mode = step.mode, .backward = step.backward});
         return self(detector).clears(guard, StepToCome<System, X>(at(door), step));
     }
 

@@ -101,18 +101,13 @@ public:
     /// Guard of a system that has one. Keeps references to both; `calls` is
     /// incremented at every evaluation.
     GuardView(const System& system, std::uint64_t& calls) noexcept
-        : GuardView(system, calls, 0, 0, guard_info_of<X>(system, 0).crossing, false)
+        : GuardView(system, calls, {}, guard_info_of<X>(system, 0).crossing)
     {
     }
 
-    GuardView(const System& system, std::uint64_t& calls, std::size_t which, Mode mode,
-              Crossing crossing, bool backward) noexcept
-        : system_(&system),
-          calls_(&calls),
-          which_(which),
-          mode_(mode),
-          crossing_(crossing),
-          backward_(backward)
+    GuardView(const System& system, std::uint64_t& calls, const GuardInMode& at,
+              Crossing crossing = Crossing::falling) noexcept
+        : system_(&system), calls_(&calls), at_(at), crossing_(crossing)
     {
     }
 
@@ -129,12 +124,12 @@ public:
     static constexpr bool is_rated = RatedGuard<System, X>;
 
     [[nodiscard]] const System& system() const noexcept { return *system_; }
-    [[nodiscard]] std::size_t which() const noexcept { return which_; }
-    [[nodiscard]] Mode mode() const noexcept { return mode_; }
+    [[nodiscard]] std::size_t which() const noexcept { return at_.which; }
+    [[nodiscard]] Mode mode() const noexcept { return at_.mode; }
     [[nodiscard]] Crossing crossing() const noexcept { return crossing_; }
 
     /// Degree of the guard as a polynomial in time and state; 0: not declared.
-    [[nodiscard]] int degree() const { return guard_info_of<X>(*system_, which_).degree; }
+    [[nodiscard]] int degree() const { return guard_info_of<X>(*system_, at_.which).degree; }
 
     /// Counts an evaluation that other code makes.
     void count() const noexcept { ++*calls_; }
@@ -145,7 +140,7 @@ public:
     {
         count();
         if constexpr (sees<V>) {
-            return detail::call_guard(*system_, which_, mode_, t, x);
+            return detail::call_guard(*system_, at_.which, at_.mode, t, x);
         } else {
             return one_of_all(t, x);
         }
@@ -183,16 +178,24 @@ private:
     [[nodiscard, gnu::always_inline]] double known_rate(double t, const V& x, const D& dxdt) const
     {
         if constexpr (detail::RateByDuals<System, V> && !detail::RateWritten<System, V, D>) {
-            return detail::rate_by_duals(*system_, which_, mode_, t, backward_ ? -1 : 1, x, dxdt);
+            return detail::rate_by_duals(
+                *system_, at_.which,
+                detail::Along{at_.mode, t, x, dxdt, at_.backward ? -1.0 : 1.0});
         } else {
-            if (!backward_) return detail::call_rate(*system_, which_, mode_, t, x, dxdt);
+            if (!at_.backward) return call_rate(t, x, dxdt);
             if constexpr (sees_rate<V, D>) {
                 const detail::NegatedView<D> forward(dxdt);
-                return -detail::call_rate(*system_, which_, mode_, t, x, forward);
+                return -call_rate(t, x, forward);
             } else {
-                return -detail::call_rate(*system_, which_, mode_, t, x, detail::negated(dxdt));
+                return -call_rate(t, x, detail::negated(dxdt));
             }
         }
+    }
+
+    template <class V, class D>
+    [[nodiscard, gnu::always_inline]] double call_rate(double t, const V& x, const D& dxdt) const
+    {
+        return detail::call_rate(*system_, at_.which, detail::Along{at_.mode, t, x, dxdt});
     }
 
     /// The rate where the closed form has none. Its evaluations are not counted.
@@ -201,8 +204,7 @@ private:
                                                                  const D& dxdt, double scale) const
     {
         std::uint64_t calls = 0;
-        return GuardView(*system_, calls, which_, mode_, crossing_, backward_)
-            .difference(t, x, dxdt, scale);
+        return GuardView(*system_, calls, at_, crossing_).difference(t, x, dxdt, scale);
     }
 
     /// The central difference along the flow over 1e-5 of the time `scale` [s] to either side: its
@@ -224,7 +226,7 @@ private:
     template <class V, class D>
     [[nodiscard]] double moved(double t, const V& x, const D& dxdt, double s) const
     {
-        const double later = backward_ ? t - s : t + s;
+        const double later = at_.backward ? t - s : t + s;
         using Moved = detail::MovedView<V, D>;
         if constexpr (sees<Moved>) {
             return value(later, Moved(x, s, dxdt));
@@ -245,16 +247,14 @@ private:
         std::array<double, on_stack> few;
         std::vector<double> many(count > on_stack ? count : 0);
         const std::span<double> all(count > on_stack ? many.data() : few.data(), count);
-        detail::call_guards(*system_, mode_, t, x, all);
-        return all[which_];
+        detail::call_guards(*system_, at_.mode, t, x, all);
+        return all[at_.which];
     }
 
     const System* system_;
     std::uint64_t* calls_;
-    std::size_t which_;
-    Mode mode_;
+    GuardInMode at_;
     Crossing crossing_;
-    bool backward_;
 };
 
 }  // namespace ricochet

@@ -33,9 +33,9 @@ public:
     /// Whether the motion is a polynomial in time, of degree `least_taylor_order` at most.
     [[nodiscard]] bool is_polynomial() const noexcept { return degree_ <= least_taylor_order; }
 
-    /// The coefficients as by `TaylorSeries::compute`, up to `order`, or all of them where the
+    /// The coefficients as by `TaylorSeries::compute`, up to an order, or all of them where the
     /// motion is a polynomial. Returns their number.
-    int compute(double t, const double* x, int order, double* out, double* guards);
+    int compute(double t, const double* x, const TaylorCoefficients<double>& to);
 
 private:
     static constexpr std::size_t width = most_taylor_order + 1;

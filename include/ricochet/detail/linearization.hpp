@@ -52,17 +52,16 @@ template <class X>
 // --- exact members ---
 
 template <class System, class X>
-[[nodiscard]] bool exact_flow(const System& system, [[maybe_unused]] Mode mode, double t,
-                              const X& x, const X& s, X& ds)
+[[nodiscard]] bool exact_flow(const System& system, const Along<X>& at, X& ds)
 {
-    if constexpr (requires { system.flow_derivative(mode, t, x, s, ds); }) {
-        system.flow_derivative(mode, t, x, s, ds);
+    if constexpr (requires { system.flow_derivative(at.mode, at.t, at.x, at.s, ds); }) {
+        system.flow_derivative(at.mode, at.t, at.x, at.s, ds);
         return true;
-    } else if constexpr (requires { system.flow_derivative(t, x, s, ds); }) {
-        system.flow_derivative(t, x, s, ds);
+    } else if constexpr (requires { system.flow_derivative(at.t, at.x, at.s, ds); }) {
+        system.flow_derivative(at.t, at.x, at.s, ds);
         return true;
     } else if constexpr (flow_takes_duals<System, X>) {
-        flow_by_duals(system, mode, t, 0, x, s, ds);
+        flow_by_duals(system, at, ds);
         return true;
     } else {
         return false;
@@ -71,31 +70,31 @@ template <class System, class X>
 
 template <class System, class X>
 [[nodiscard]] double exact_guard(const System& system, [[maybe_unused]] std::size_t which,
-                                 [[maybe_unused]] Mode mode, double t, const X& x, const X& s)
+                                 const Along<X>& at)
 {
-    if constexpr (requires { system.guard_derivative(which, mode, t, x, s); }) {
-        return system.guard_derivative(which, mode, t, x, s);
+    if constexpr (requires { system.guard_derivative(which, at.mode, at.t, at.x, at.s); }) {
+        return system.guard_derivative(which, at.mode, at.t, at.x, at.s);
     } else if constexpr (CountsGuards<System>) {
-        return system.guard_derivative(which, t, x, s);
-    } else if constexpr (requires { system.guard_derivative(mode, t, x, s); }) {
-        return system.guard_derivative(mode, t, x, s);
+        return system.guard_derivative(which, at.t, at.x, at.s);
+    } else if constexpr (requires { system.guard_derivative(at.mode, at.t, at.x, at.s); }) {
+        return system.guard_derivative(at.mode, at.t, at.x, at.s);
     } else {
-        return system.guard_derivative(t, x, s);
+        return system.guard_derivative(at.t, at.x, at.s);
     }
 }
 
 template <class System, class X, class... Which>
-[[nodiscard]] bool exact_reset(const System& system, [[maybe_unused]] Mode mode, double t,
-                               const X& x, double dt, X& s, const Which&... which)
+[[nodiscard]] bool exact_reset(const System& system, const BeforeReset<X>& at, X& s,
+                               const Which&... which)
 {
-    if constexpr (requires { system.reset_derivative(which..., mode, t, x, dt, s); }) {
-        system.reset_derivative(which..., mode, t, x, dt, s);
+    if constexpr (requires { system.reset_derivative(which..., at.mode, at.t, at.x, at.dt, s); }) {
+        system.reset_derivative(which..., at.mode, at.t, at.x, at.dt, s);
         return true;
-    } else if constexpr (requires { system.reset_derivative(which..., t, x, dt, s); }) {
-        system.reset_derivative(which..., t, x, dt, s);
+    } else if constexpr (requires { system.reset_derivative(which..., at.t, at.x, at.dt, s); }) {
+        system.reset_derivative(which..., at.t, at.x, at.dt, s);
         return true;
     } else if constexpr (reset_takes_duals<System, X, Which...>) {
-        reset_by_duals(system, mode, t, dt, x, s, which...);
+        reset_by_duals(system, at, s, which...);
         return true;
     } else {
         return false;
@@ -120,15 +119,14 @@ struct ResetOf {
         }
     }
     template <class System, class X>
-    [[nodiscard]] bool derive(const System& system, Mode mode, double t, const X& x, double dt,
-                              X& s) const
+    [[nodiscard]] bool derive(const System& system, const BeforeReset<X>& at, X& s) const
     {
         if constexpr (ResetsTogether<System, X>) {
-            return exact_reset(system, mode, t, x, dt, s, FiredGuards(std::span(&which, 1)));
+            return exact_reset(system, at, s, FiredGuards(std::span(&which, 1)));
         } else if constexpr (CountsGuards<System>) {
-            return exact_reset(system, mode, t, x, dt, s, which);
+            return exact_reset(system, at, s, which);
         } else {
-            return exact_reset(system, mode, t, x, dt, s);
+            return exact_reset(system, at, s);
         }
     }
 };
@@ -183,14 +181,13 @@ struct ResetSet {
     }
 
     template <class System, class X>
-    [[nodiscard]] bool derive(const System& system, Mode mode, double t, const X& x, double dt,
-                              X& s) const
+    [[nodiscard]] bool derive(const System& system, const BeforeReset<X>& at, X& s) const
     {
         if constexpr (ResetsTogether<System, X>) {
-            return exact_reset(system, mode, t, x, dt, s, fired);
+            return exact_reset(system, at, s, fired);
         } else {
             if (fired.size() != 1 || fired.time_event()) return false;
-            return ResetOf{fired[0]}.derive(system, mode, t, x, dt, s);
+            return ResetOf{fired[0]}.derive(system, at, s);
         }
     }
 
@@ -252,7 +249,7 @@ struct RestOf {
         return call_rest(system, which, mode, t, x);
     }
     template <class System, class X>
-    [[nodiscard]] static bool derive(const System&, Mode, double, const X&, double, X&)
+    [[nodiscard]] static bool derive(const System&, const BeforeReset<X>&, X&)
     {
         return false;
     }
@@ -266,13 +263,12 @@ struct TimeReset {
     }
     template <class System, class X>
     [[nodiscard]] static bool derive([[maybe_unused]] const System& system,
-                                     [[maybe_unused]] Mode mode, [[maybe_unused]] double t,
-                                     [[maybe_unused]] const X& x, [[maybe_unused]] double dt,
+                                     [[maybe_unused]] const BeforeReset<X>& at,
                                      [[maybe_unused]] X& s)
     {
         if constexpr (!TimeResetting<System, X>) return true;
         if constexpr (TimeResetting<System, X> && time_reset_takes_duals<System, X>) {
-            time_reset_by_duals(system, mode, t, dt, x, s);
+            time_reset_by_duals(system, at, s);
             return true;
         }
         return false;
@@ -318,30 +314,29 @@ public:
     /// ds = (df/dx) s.
     void flow_along(Mode mode, double t, const X& x, const X& s, X& ds) const
     {
-        if (exact_flow(system_, mode, t, x, s, ds)) return;
+        if (exact_flow(system_, {mode, t, x, s, 0}, ds)) return;
         const double h = step_along(differences_, x, s);
         if (!std::isfinite(h)) {
             for_each_component(ds, [&](auto i) { ds[i] = 0; });
             return;
         }
-        Scratch<X, 3> room(x);
+        Scratch<X, 1> room(x);
         const auto flow_at = [&](std::size_t k, X& f) {
             move(room[0], x, central_stencil.offset[k] * h, s);
             call_flow(system_, mode, t, room[0], f);
         };
-        differentiate_into(ds, central_stencil, h, flow_at, room[1], room[2]);
+        differentiate_into(ds, central_stencil, h, flow_at);
     }
 
     /// df = df/dp of parameter j.
     void flow_by(std::size_t j, Mode mode, double t, const X& x, X& df) const
     {
         if (exact_[j].flow) return exact_[j].flow(mode, t, numbers_of(x), numbers_of(df));
-        Scratch<X, 2> room(x);
         const Neighbours<System>& around = parameters_[j];
         const auto flow_at = [&](std::size_t k, X& f) {
             call_flow(around.systems[k], mode, t, x, f);
         };
-        differentiate_into(df, around.stencil, around.h, flow_at, room[0], room[1]);
+        differentiate_into(df, around.stencil, around.h, flow_at);
     }
 
     /// The flow at states of any scalar, which it takes.
@@ -354,7 +349,7 @@ public:
     template <class S, class Xs>
     void flow_along_of(Mode mode, const S& t, const Xs& x, const Xs& s, Xs& ds) const
     {
-        flow_along_by_duals(system_, mode, t, x, s, ds);
+        flow_along_by_duals(system_, mode, t, dual_state<S>(x, s), ds);
     }
     /// As `flow_by`.
     template <class S, class Xs>
@@ -387,9 +382,9 @@ public:
                                      const X& s) const
     {
         if constexpr (has_exact_guard) {
-            return exact_guard(system_, which, mode, t, x, s);
+            return exact_guard(system_, which, Along{mode, t, x, s, 0});
         } else if constexpr (RateByDuals<System, X>) {
-            return rate_by_duals(system_, which, mode, t, 0, x, s);
+            return rate_by_duals(system_, which, Along{mode, t, x, s, 0});
         } else {
             const double h = step_along(differences_, x, s);
             if (!std::isfinite(h)) return 0;
@@ -413,10 +408,10 @@ public:
                                     const X& f) const
     {
         if constexpr (RateAlone<System, X>) {
-            return call_rate(system_, which, mode, t, x, f);
+            return call_rate(system_, which, Along{mode, t, x, f});
         } else if constexpr (RatesTogether<System, X>) {
             std::vector<double> rates(guard_count_of<X>(system_));
-            call_rates(system_, mode, t, x, f, std::span<double>(rates));
+            call_rates(system_, Along{mode, t, x, f}, std::span<double>(rates));
             return rates[which];
         } else {
             const double h = step_in_time(x, f, 1);
@@ -431,16 +426,17 @@ public:
 
     /// (dR/dx) s + (dR/dt) dt at the state before the reset.
     template <class Reset>
-    [[nodiscard]] X reset_along(const Reset& reset, Mode mode, double t, const X& x, double dt,
-                                const X& s) const
+    [[nodiscard]] X reset_along(const Reset& reset, const BeforeReset<X>& at, const X& s) const
     {
         X after = s;
-        if (reset.derive(system_, mode, t, x, dt, after)) return after;
+        if (reset.derive(system_, at, after)) return after;
+        const auto& [mode, t, dt, x] = at;
         const double h = step_in_time(x, s, dt);
         if (!std::isfinite(h)) return zeros_shaped_like(reset_of(system_, reset, mode, t, x));
         return differentiate(central_stencil, h, [&](std::size_t k) {
             const double factor = central_stencil.offset[k] * h;
-            return reset_of(system_, reset, mode, t + factor * dt, moved_along(x, factor, s));
+            return reset_of(system_, reset, at.mode, at.t + factor * at.dt,
+                            moved_along(at.x, factor, s));
         });
     }
 

@@ -126,13 +126,13 @@ private:
 
     [[nodiscard, gnu::always_inline]] auto guard_at_end() const
     {
+        const GuardInMode of_run{.mode = caller.mode, .backward = caller.backward};
         if constexpr (std::is_same_v<System, ByPointer>) {
             static constexpr GuardInfo unused{};
             const SystemAt<C> system(*static_cast<const SystemTable<C>*>(run.system), door);
-            return CoreGuard<C>(system, run.guard_calls, 0, caller.mode, unused, caller.backward);
+            return CoreGuard<C>(system, run.guard_calls, of_run, unused);
         } else {
-            return GuardView<System, X>(Of::at(door).system(), run.guard_calls, 0, caller.mode,
-                                        Crossing::falling, caller.backward);
+            return GuardView<System, X>(Of::at(door).system(), run.guard_calls, of_run);
         }
     }
 

@@ -164,7 +164,8 @@ public:
             const double moved = dt[index(j)];
             X s = column_of(before.derivatives, j, before.x);
             move(s, s, moved, f_before);
-            X after = linearization_.reset_along(reset, before.mode, before.t, before.x, moved, s);
+            X after = linearization_.reset_along(
+                reset, {.mode = before.mode, .t = before.t, .dt = moved, .x = before.x}, s);
             if (const auto p = parameter_of(j)) {
                 const X by = linearization_.reset_by(*p, reset, before.mode, before.t, before.x);
                 move(after, after, 1, by);

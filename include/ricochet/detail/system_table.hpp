@@ -15,6 +15,7 @@
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/system.hpp"
 
 namespace ricochet::detail {
 
@@ -22,6 +23,13 @@ namespace ricochet::detail {
 struct GuardPoint {
     double value;
     double rate;
+};
+
+/// A time inside a step and the length over which the motion is taken as smooth; two numbers, which
+/// are passed in registers.
+struct ScaledTime {
+    double t;      ///< [s]
+    double scale;  ///< [s]
 };
 
 template <class X>
@@ -55,26 +63,20 @@ struct SystemTable {
     double (*guard_on)(Door, std::size_t which, Mode, double t, const View& x) = nullptr;
     /// Rate of a guard with x' = dxdt: in closed form, else the central difference over 1e-5
     /// `scale`, at the cost of `calls_of_rate` evaluations of the guard.
-    double (*rate)(Door, std::size_t which, Mode, bool backward, double t, const X& x,
-                   const X& dxdt, double scale) = nullptr;
-    double (*rate_on)(Door, std::size_t which, Mode, bool backward, double t, const View& x,
-                      const RateView& dxdt, double scale) = nullptr;
+    double (*rate)(Door, GuardInMode, ScaledTime, const X& x, const X& dxdt) = nullptr;
+    double (*rate_on)(Door, GuardInMode, ScaledTime, const View& x, const RateView& dxdt) = nullptr;
     unsigned calls_of_rate = 0;
     /// Value and rate in one call. Null where a system computes guards or rates all together.
-    GuardPoint (*point)(Door, std::size_t which, Mode, bool backward, double t, const X& x,
-                        const X& dxdt, double scale) = nullptr;
+    GuardPoint (*point)(Door, GuardInMode, ScaledTime, const X& x, const X& dxdt) = nullptr;
     /// All rates, from one call of the system, with respect to the time itself.
-    void (*rates)(Door, Mode, double t, const X& x, const X& dxdt,
-                  std::span<double> rates) = nullptr;
+    void (*rates)(Door, const Along<X>&, std::span<double> rates) = nullptr;
     /// The same, from a call for each guard.
-    void (*each_rate)(Door, Mode, double t, const X& x, const X& dxdt,
-                      std::span<double> rates) = nullptr;
+    void (*each_rate)(Door, const Along<X>&, std::span<double> rates) = nullptr;
 
     bool (*enabled_in)(Door, std::size_t which, Mode) = nullptr;
     bool (*enabled_at)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
     Mode (*reset)(Door, std::size_t which, Mode, double t, X& x) = nullptr;
-    Mode (*reset_set)(Door, std::span<const std::size_t> fired, bool on_time, Mode, double t,
-                      X& x) = nullptr;
+    Mode (*reset_set)(Door, const FiredGuards&, Mode, double t, X& x) = nullptr;
     Mode (*rest)(Door, std::size_t which, Mode, double t, X& x) = nullptr;
 
     double (*next_time_event)(Door, double t) = nullptr;
@@ -136,14 +138,9 @@ class CoreGuard {
 public:
     using State = X;
 
-    CoreGuard(const SystemAt<X>& system, std::uint64_t& calls, std::size_t which, Mode mode,
-              const GuardInfo& info, bool backward) noexcept
-        : system_(system),
-          which_(which),
-          mode_(mode),
-          backward_(backward),
-          calls_(&calls),
-          info_(&info)
+    CoreGuard(const SystemAt<X>& system, std::uint64_t& calls, const GuardInMode& at,
+              const GuardInfo& info) noexcept
+        : system_(system), at_(at), calls_(&calls), info_(&info)
     {
     }
 
@@ -155,8 +152,8 @@ public:
     [[nodiscard]] bool sees_rate_views() const noexcept { return system_->rate_on; }
 
     [[nodiscard]] bool is_rated() const noexcept { return system_->rated; }
-    [[nodiscard]] std::size_t which() const noexcept { return which_; }
-    [[nodiscard]] Mode mode() const noexcept { return mode_; }
+    [[nodiscard]] std::size_t which() const noexcept { return at_.which; }
+    [[nodiscard]] Mode mode() const noexcept { return at_.mode; }
     [[nodiscard]] Crossing crossing() const noexcept { return info_->crossing; }
     [[nodiscard]] int degree() const noexcept { return info_->degree; }
     [[nodiscard]] const SystemAt<X>& system() const noexcept { return system_; }
@@ -164,17 +161,17 @@ public:
     [[nodiscard]] double value(double t, const X& x) const
     {
         ++*calls_;
-        return system_->guard(system_.door(), which_, mode_, t, x);
+        return system_->guard(system_.door(), at_.which, at_.mode, t, x);
     }
     [[nodiscard]] double value(double t, const View& x) const
     {
         ++*calls_;
-        return system_->guard_on(system_.door(), which_, mode_, t, x);
+        return system_->guard_on(system_.door(), at_.which, at_.mode, t, x);
     }
     [[nodiscard]] double rate(double t, const X& x, const X& dxdt, double scale) const
     {
         *calls_ += system_->calls_of_rate;
-        return system_->rate(system_.door(), which_, mode_, backward_, t, x, dxdt, scale);
+        return system_->rate(system_.door(), at_, {t, scale}, x, dxdt);
     }
     [[nodiscard]] double raw_rate(double t, const X& x, const X& dxdt, double scale) const
     {
@@ -185,18 +182,16 @@ public:
     {
         if (!system_->point) return {value(t, x), rate(t, x, dxdt, scale)};
         *calls_ += 1 + system_->calls_of_rate;
-        return system_->point(system_.door(), which_, mode_, backward_, t, x, dxdt, scale);
+        return system_->point(system_.door(), at_, {t, scale}, x, dxdt);
     }
     [[nodiscard]] double rate(double t, const View& x, const RateView& dxdt, double scale) const
     {
-        return system_->rate_on(system_.door(), which_, mode_, backward_, t, x, dxdt, scale);
+        return system_->rate_on(system_.door(), at_, {t, scale}, x, dxdt);
     }
 
 private:
     SystemAt<X> system_;
-    std::size_t which_;
-    Mode mode_;
-    bool backward_;
+    GuardInMode at_;
     std::uint64_t* calls_;
     const GuardInfo* info_;
 };

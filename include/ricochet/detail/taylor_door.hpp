@@ -181,20 +181,16 @@ struct TaylorDoor : Door<System, X> {
         step.resize(size, guard_count());
     }
 
-    /// The coefficients up to `order`, or all of them where there are fewer; returns their number.
-    int compute(Mode mode, double t, const double* x, int order, double* out, double* guards)
+    using Coefficients = TaylorCoefficients<double>;
+
+    /// The coefficients up to an order, or all of them where there are fewer; returns their number.
+    int compute(Mode mode, double t, const double* x, const Coefficients& to)
     {
         if constexpr (is_constant) {
-            if (as_compiled_) {
-                int computed = order;
-                dispatch(mode, t, x, computed, out, guards, std::make_index_sequence<tapes>{});
-                return computed;
-            }
+            if (as_compiled_) return dispatch(mode, t, x, to, std::make_index_sequence<tapes>{});
         }
-        if constexpr (takes_series) {
-            return recorded(mode, step.size()).compute(t, x, order, out, guards);
-        }
-        return order;
+        if constexpr (takes_series) return recorded(mode, step.size()).compute(t, x, to);
+        return to.order;
     }
 
     /// Whether the motion in a mode is a polynomial, of which `compute` has all coefficients.
@@ -265,11 +261,9 @@ private:
         Recording recording;
         std::vector<int> outputs(size + guard_count());
         if constexpr (n > 0) {
-            std::array<Recorded, n> x{}, dxdt{};
-            record_into(this->system(), mode, recording, x, dxdt, guard_count(), outputs);
+            record_into(this->system(), mode, recording, std::array<Recorded, n>{}, outputs);
         } else {
-            std::vector<Recorded> x(size), dxdt(size);
-            record_into(this->system(), mode, recording, x, dxdt, guard_count(), outputs);
+            record_into(this->system(), mode, recording, std::vector<Recorded>(size), outputs);
         }
         return {size, recording, std::move(outputs)};
     }
@@ -308,23 +302,22 @@ private:
     }
 
     template <std::size_t... mode>
-    void dispatch(Mode at, double t, const double* x, int& order, double* out, double* guards,
-                  std::index_sequence<mode...>)
+    int dispatch(Mode at, double t, const double* x, Coefficients to, std::index_sequence<mode...>)
     {
         constexpr bool one = sizeof...(mode) == 1;
         static_cast<void>((... || ((one || at == static_cast<Mode>(mode)) &&
-                                   compute_in<static_cast<Mode>(mode)>(t, x, order, out, guards))));
+                                   compute_in<static_cast<Mode>(mode)>(t, x, to))));
+        return to.order;
     }
     template <Mode mode>
-    bool compute_in(double t, const double* x, int& order, double* out, double* guards)
+    bool compute_in(double t, const double* x, Coefficients& to)
     {
         constexpr int degree = polynomial_order(taylor_tape<System, n, mode>);
         constexpr bool is_polynomial = degree <= least_taylor_order;
-        if (is_polynomial) order = degree;
+        if (is_polynomial) to.order = degree;
         using Series =
             TaylorSeries<taylor_tape<System, n, mode>, is_polynomial ? degree : most_taylor_order>;
-        Series::compute(constants_[static_cast<std::size_t>(mode)].data(), t, x, order, out,
-                        guards);
+        Series::compute(constants_[static_cast<std::size_t>(mode)].data(), t, x, to);
         return true;
     }
 

@@ -76,7 +76,8 @@ class TaylorKernel {
         for (std::size_t i = 0; i < size; ++i) step.x[i] = state.x0[i];
         double* const c = step.coefficients.data();
         double* const g = step.guards.data();
-        const int computed = of.compute(state.mode, state.start.value, step.x.data(), order, c, g);
+        const int computed =
+            of.compute(state.mode, state.start.value, step.x.data(), {order, c, g});
         if (state.backward) {
             for (std::size_t k = 1; k <= static_cast<std::size_t>(computed); k += 2) {
                 for (std::size_t i = 0; i < size; ++i) c[k * size + i] = -c[k * size + i];
@@ -247,8 +248,8 @@ class TaylorKernel {
                                     .sign = sign,
                                     .from_surface = crossing.from_surface};
         if (!find_first_root(on_series, sign * crossing.end, root)) return false;
-        const Guard guard(at(door).system(), crossing.calls, crossing.which, state.mode,
-                          Crossing::falling, state.backward);
+        const Guard guard(at(door).system(), crossing.calls,
+                          {crossing.which, state.mode, state.backward});
         const double* const c = step.coefficients.data();
         const std::size_t size = step.size();
         RoomFor scratch(at(door));
@@ -384,8 +385,8 @@ class TaylorKernel {
     {
         if constexpr (on_series) {
             if (of.step.guard_count() == 0) return true;
-            const Guard guard(of.system(), run.guard_calls, 0, state.mode, Crossing::falling,
-                              state.backward);
+            const Guard guard(of.system(), run.guard_calls,
+                              {.mode = state.mode, .backward = state.backward});
             run.g1 = guard.value(state.time(state.h), loaded(of, state.x1));
             if (!is_clear(of.step, state, run)) return false;
             run.g0 = run.g1;

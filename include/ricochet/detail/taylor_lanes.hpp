@@ -304,8 +304,8 @@ private:
 
     [[gnu::always_inline]] void expand()
     {
-        Series::compute_inline(constants_.data(), start_, x0_.data(), order_, coefficients_.data(),
-                               guards_.data());
+        Series::compute_inline(constants_.data(), start_, x0_.data(),
+                               {order_, coefficients_.data(), guards_.data()});
         if (!backward_) return;
         for (std::size_t k = 1; k <= static_cast<std::size_t>(order_); k += 2) {
             for (std::size_t i = 0; i < n; ++i) {
@@ -383,8 +383,8 @@ private:
             const auto& [door, state] = runs_[lane];
             std::uint64_t calls = 0;
             try {
-                const Guard guard(door->system(), calls, 0, state->mode, Crossing::falling,
-                                  backward_);
+                const Guard guard(door->system(), calls,
+                                  {.mode = state->mode, .backward = backward_});
                 g1.set(lane, guard.value(t[lane], x));
             } catch (...) {
                 fine.set(lane, false);

@@ -491,14 +491,15 @@ concept ScalarGuards =
                                 " components, expected " + std::to_string(expected));
 }
 
-/// Records the flow of `system`, and its first `guards` guards. The inputs are the components and
-/// the time, in this order; the outputs are the rates and the guards. `x` and `dxdt` have the size
-/// of the state, `outputs` the total size.
+/// Records the flow of `system`, and its first guards, as many as there are outputs beyond the
+/// rates. The inputs are the components and the time, in this order; the outputs are the rates and
+/// the guards. `x` has the size of the state.
 template <class System, class Xs, class Outputs>
-constexpr void record_into(const System& system, Mode mode, Recording& recording, Xs& x, Xs& dxdt,
-                           [[maybe_unused]] std::size_t guards, Outputs& outputs)
+constexpr void record_into(const System& system, Mode mode, Recording& recording, Xs x,
+                           Outputs& outputs)
 {
     const std::size_t n = x.size();
+    Xs dxdt = x;
     for (std::size_t i = 0; i < n; ++i) x[i] = {recording, recording.push_back({})};
     const Recorded t(recording, recording.push_back({}));
     if constexpr (requires { system.flow(mode, t, x, dxdt); }) {
@@ -514,7 +515,7 @@ constexpr void record_into(const System& system, Mode mode, Recording& recording
     };
     for (std::size_t i = 0; i < n; ++i) outputs[i] = index_of(dxdt[i]);
     if constexpr (ScalarGuardsOn<System, Xs>) {
-        for (std::size_t i = 0; i < guards; ++i) {
+        for (std::size_t i = 0; n + i < outputs.size(); ++i) {
             outputs[n + i] = index_of(scalar_guard(system, i, mode, t, std::as_const(x)));
         }
     }
@@ -525,9 +526,7 @@ template <class System, std::size_t n, std::size_t m>
 constexpr void record_flow(const System& system, Mode mode, Recording& recording,
                            std::array<int, n + m>& outputs)
 {
-    std::array<Recorded, n> x{};
-    std::array<Recorded, n> dxdt{};
-    record_into(system, mode, recording, x, dxdt, m, outputs);
+    record_into(system, mode, recording, std::array<Recorded, n>{}, outputs);
 }
 
 /// The operations that the outputs depend on, numbered from the first one: operands before results,

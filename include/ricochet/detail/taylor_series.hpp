@@ -87,17 +87,18 @@ class TaylorSeries {
     static constexpr bool has_slope = slopes_wanted[static_cast<std::size_t>(i)];
 
 public:
-    /// out[k n + i] = coefficient k of component i, up to `order`, which is `most`, `most` - 4 or
-    /// `most` - 8. The same for the m guards in `guards`.
-    static void compute(const S* constants, S t, const S* x, int order, S* out, S* guards)
+    /// The coefficients at (t, x), up to an order that is `most`, `most` - 4 or `most` - 8.
+    static void compute(const S* constants, S t, const S* x, const TaylorCoefficients<S>& to)
     {
-        compute_inline(constants, t, x, order, out, guards);
+        compute_inline(constants, t, x, to);
     }
     /// The same, for callers that are compiled for another machine.
     [[gnu::always_inline]] static void compute_inline(const S* constants, const S& t, const S* x,
-                                                      int order, S* out, S* guards)
+                                                      const TaylorCoefficients<S>& to)
     {
-        TaylorSeries series(constants, guards);
+        const int order = to.order;
+        S* const out = to.x;
+        TaylorSeries series(constants, to.guards);
         for (int i = 0; i < n; ++i) out[i] = series.c_[i][0] = x[i];
         series.c_[n][0] = t;
         series.c_[n][1] = 1;

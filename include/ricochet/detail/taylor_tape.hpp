@@ -13,6 +13,15 @@
 
 namespace ricochet::detail {
 
+/// Where the coefficients of a motion are written, up to an order.
+/// @tparam S  double, or several
+template <class S>
+struct TaylorCoefficients {
+    int order;
+    S* x;       ///< x[k n + i] = coefficient k of component i of n
+    S* guards;  ///< the same of the guards
+};
+
 /// An operation of the tape. Its constant has the operation's number.
 struct TapeOp {
     TaylorOp op = TaylorOp::input;

@@ -208,7 +208,7 @@ public:
     {
         return with_head(y, [&](const X& x) {
             return with_head(dydt, [&](const X& dxdt) {
-                return detail::call_rate(system(), which, mode, t, x, dxdt);
+                return detail::call_rate(system(), which, detail::Along{mode, t, x, dxdt});
             });
         });
     }
@@ -218,7 +218,7 @@ public:
     {
         with_head(y, [&](const X& x) {
             with_head(dydt, [&](const X& dxdt) {
-                detail::call_rates(system(), mode, t, x, dxdt, rates);
+                detail::call_rates(system(), detail::Along{mode, t, x, dxdt}, rates);
             });
         });
     }
@@ -260,7 +260,7 @@ public:
         // derivatives.
         const bool again = saltation_.at_one_time(last_event(y), t);
         if (again && next == mode && same(before, after)) return mode;
-        transform(mode, t, y, next, after, [&](auto& motion, auto& last) {
+        transform(motion_at(mode, t, y), y, next, after, [&](auto& motion, auto& last) {
             return saltation_.pass_set(fired, after, motion, last);
         });
         return next;
@@ -286,7 +286,7 @@ public:
             y.clear();
             return mode;
         }
-        transform(mode, t, y, next, after, [&](auto& motion, auto& last) {
+        transform(motion_at(mode, t, y), y, next, after, [&](auto& motion, auto& last) {
             // The limit of the events moves as the last event does.
             const detail::EventTime time = last.any ? detail::EventTime{Undefined::no, last.dt}
                                                     : saltation_.crossing(which, motion, last);
@@ -318,7 +318,7 @@ public:
             y.clear();
             return mode;
         }
-        transform(mode, t, y, next, after, [&](auto& motion, auto& last) {
+        transform(motion_at(mode, t, y), y, next, after, [&](auto& motion, auto& last) {
             return saltation_.pass_set(FiredGuards({}, true), after, motion, last);
         });
         return next;
@@ -496,12 +496,11 @@ private:
         return {t, last_event_derivatives(y), t != never, y[y.size() - 1]};
     }
 
-    /// Replaces y by the state `after` and the derivatives that `pass` computes from the
-    /// motion, or by zeros if it finds that they do not exist.
+    /// Replaces y, whose motion this is, by the state `after` and the derivatives that `pass`
+    /// computes from the motion, or by zeros if it finds that they do not exist.
     template <class Pass>
-    void transform(Mode mode, double t, State& y, Mode next, const X& after, const Pass& pass) const
+    void transform(Motion motion, State& y, Mode next, const X& after, const Pass& pass) const
     {
-        Motion motion = motion_at(mode, t, y);
         detail::LastEvent last = last_event_of(y);
         Undefined reason = undefined(y);
         if (reason == Undefined::no && columns() > 0) {

@@ -100,8 +100,8 @@ public:
         if (!(step.h() >= model().step_min && step.h() <= model().step_max)) return false;
         std::array<double, max_features> input;
         if (recipe_ == Recipe::ballistic) guard.count();
-        features(recipe_, guard.system(), step.time(0), step.x0(), step.rate0(), step.h(),
-                 input.data());
+        const StepAhead start{step.time(0), step.x0(), step.rate0(), step.h()};
+        features(recipe_, guard.system(), start, input.data());
         return classifier_->in_domain(input.data()) &&
                !classifier_->alarm(classifier_->logit(input.data()));
     }

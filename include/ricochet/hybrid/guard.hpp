@@ -22,6 +22,14 @@ namespace ricochet {
 /// with an unscoped enumeration.
 using Mode = std::uint32_t;
 
+/// A guard of a system in one mode. Rates are with respect to the offset inside a step: in a run
+/// backward in time they are the negative of dg/dt.
+struct GuardInMode {
+    std::size_t which = 0;
+    Mode mode = 0;
+    bool backward = false;
+};
+
 /// The sign change that counts as an event.
 enum class Crossing {
     falling,  ///< positive, then zero or negative: leaving the mode

@@ -87,6 +87,7 @@ public:
     {
     }
 
+    [[nodiscard]] std::span<const std::size_t> guards() const noexcept { return guards_; }
     [[nodiscard]] auto begin() const noexcept { return guards_.begin(); }
     [[nodiscard]] auto end() const noexcept { return guards_.end(); }
     [[nodiscard]] std::size_t size() const noexcept { return guards_.size(); }
@@ -461,30 +462,30 @@ template <class System, class X>
     }
 }
 
-/// The rate of one guard along x' = dxdt.
+/// The rate of one guard along a motion.
 template <class System, class X, class D>
-[[gnu::always_inline]] [[nodiscard]] inline double call_rate(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, const X& x, const D& dxdt)
+[[gnu::always_inline]] [[nodiscard]] inline double call_rate(const System& system, [[maybe_unused]] std::size_t which, const Along<X, D>& at)
 {
     if constexpr (!RateWritten<System, X, D>) {
-        return rate_by_duals(system, which, mode, t, 1, x, dxdt);
+        return rate_by_duals(system, which, at);
     } else if constexpr (ModedRateOf<System, X, D>) {
-        return system.guard_rate(which, mode, t, x, dxdt);
+        return system.guard_rate(which, at.mode, at.t, at.x, at.s);
     } else if constexpr (PlainRateOf<System, X, D>) {
-        return system.guard_rate(which, t, x, dxdt);
+        return system.guard_rate(which, at.t, at.x, at.s);
     } else if constexpr (ModedSingleRate<System, X, D>) {
-        return system.guard_rate(mode, t, x, dxdt);
+        return system.guard_rate(at.mode, at.t, at.x, at.s);
     } else {
-        return system.guard_rate(t, x, dxdt);
+        return system.guard_rate(at.t, at.x, at.s);
     }
 }
 
 template <class System, class X>
-inline void call_rates(const System& system, [[maybe_unused]] Mode mode, double t, const X& x, const X& dxdt, std::span<double> rates)
+inline void call_rates(const System& system, const Along<X>& at, std::span<double> rates)
 {
     if constexpr (ModedRates<System, X>) {
-        system.guard_rates(mode, t, x, dxdt, rates);
+        system.guard_rates(at.mode, at.t, at.x, at.s, rates);
     } else {
-        system.guard_rates(t, x, dxdt, rates);
+        system.guard_rates(at.t, at.x, at.s, rates);
     }
 }
 

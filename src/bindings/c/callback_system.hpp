@@ -12,6 +12,7 @@
 
 #include "bindings/c/error.hpp"
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/system.hpp"
 #include "ricochet/ricochet.h"
 
 namespace ricochet::c {
@@ -98,11 +99,10 @@ public:
         return mode;
     }
     template <class X>
-    [[nodiscard]] Mode reset_set(std::span<const std::size_t> fired, bool on_time, Mode mode,
-                                 double t, X& x) const
+    [[nodiscard]] Mode reset_set(const FiredGuards& fired, Mode mode, double t, X& x) const
     {
-        heed(at_.reset_set(at_.user, fired.data(), fired.size(), on_time, &mode, t, x.data(),
-                           x.size()),
+        heed(at_.reset_set(at_.user, fired.guards().data(), fired.size(), fired.time_event(), &mode,
+                           t, x.data(), x.size()),
              "reset_set", t);
         return mode;
     }

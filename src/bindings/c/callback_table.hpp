@@ -59,10 +59,12 @@ class CallbackTable {
     }
 
     /// The rate of the guard by a central difference, as `GuardView::difference`.
-    static double difference(void* door, std::size_t which, Mode mode, bool backward, double t,
-                             const X& x, const X& dxdt, double scale)
+    static double difference(void* door, GuardInMode of, detail::ScaledTime time, const X& x,
+                             const X& dxdt)
     {
-        const double delta = 1e-5 * scale;
+        const auto [which, mode, backward] = of;
+        const double t = time.t;
+        const double delta = 1e-5 * time.scale;
         const double later = backward ? -delta : delta;
         const double ahead = guard_at(door, which, mode, t + later, x, dxdt, delta);
         const double behind = guard_at(door, which, mode, t - later, x, dxdt, -delta);
@@ -71,16 +73,14 @@ class CallbackTable {
         return detail::one_sided(guard(door, which, mode, t, x), ahead, behind, delta);
     }
 
-    static double rate(void* door, std::size_t which, Mode mode, bool backward, double t,
-                       const X& x, const X& dxdt, double scale)
+    static double rate(void* door, GuardInMode guard, detail::ScaledTime time, const X& x,
+                       const X& dxdt)
     {
         const CallbackSystem& system = of(door);
         const rc_callbacks& has = system.callbacks();
-        if (!has.guard_rate && !has.guard_rates) {
-            return difference(door, which, mode, backward, t, x, dxdt, scale);
-        }
+        if (!has.guard_rate && !has.guard_rates) return difference(door, guard, time, x, dxdt);
         const X* forward = &dxdt;
-        if (backward) {
+        if (guard.backward) {
             X& turned = at(door).turned;
             turned = dxdt;
             detail::for_each_component(turned, [&](auto i) { turned[i] = -turned[i]; });
@@ -88,27 +88,26 @@ class CallbackTable {
         }
         double rate = 0;
         if (has.guard_rate) {
-            rate = system.guard_rate(which, mode, t, x, *forward);
+            rate = system.guard_rate(guard.which, guard.mode, time.t, x, *forward);
         } else {
-            system.guard_rates(mode, t, x, *forward, at(door).all);
-            rate = at(door).all[which];
+            system.guard_rates(guard.mode, time.t, x, *forward, at(door).all);
+            rate = at(door).all[guard.which];
         }
-        if (!std::isfinite(rate)) return difference(door, which, mode, backward, t, x, dxdt, scale);
-        return backward ? -rate : rate;
+        if (!std::isfinite(rate)) return difference(door, guard, time, x, dxdt);
+        return guard.backward ? -rate : rate;
     }
 
-    static detail::GuardPoint point(void* door, std::size_t which, Mode mode, bool backward,
-                                    double t, const X& x, const X& dxdt, double scale)
+    static detail::GuardPoint point(void* door, GuardInMode guard, detail::ScaledTime time,
+                                    const X& x, const X& dxdt)
     {
-        return {of(door).guard(which, mode, t, x),
-                rate(door, which, mode, backward, t, x, dxdt, scale)};
+        return {of(door).guard(guard.which, guard.mode, time.t, x),
+                rate(door, guard, time, x, dxdt)};
     }
 
-    static void each_rate(void* door, Mode mode, double t, const X& x, const X& dxdt,
-                          std::span<double> rates)
+    static void each_rate(void* door, const detail::Along<X>& motion, std::span<double> rates)
     {
         for (std::size_t i = 0; i < rates.size(); ++i) {
-            rates[i] = of(door).guard_rate(i, mode, t, x, dxdt);
+            rates[i] = of(door).guard_rate(i, motion.mode, motion.t, motion.x, motion.s);
         }
     }
 
@@ -126,9 +125,8 @@ class CallbackTable {
         table.rate = &rate;
         if (has.guard && !has.guard_rates) table.point = &point;
         if (has.guard_rates) {
-            table.rates = [](void* door, Mode mode, double t, const X& x, const X& dxdt,
-                             std::span<double> rates) {
-                of(door).guard_rates(mode, t, x, dxdt, rates);
+            table.rates = [](void* door, const detail::Along<X>& motion, std::span<double> rates) {
+                of(door).guard_rates(motion.mode, motion.t, motion.x, motion.s, rates);
             };
         } else if (has.guard_rate) {
             table.each_rate = &each_rate;
@@ -144,9 +142,9 @@ class CallbackTable {
             };
         }
         if (has.reset_set) {
-            table.reset_set = [](void* door, std::span<const std::size_t> fired, bool on_time,
-                                 Mode mode, double t,
-                                 X& x) { return of(door).reset_set(fired, on_time, mode, t, x); };
+            table.reset_set = [](void* door, const FiredGuards& fired, Mode mode, double t, X& x) {
+                return of(door).reset_set(fired, mode, t, x);
+            };
         } else if (has.reset) {
             table.reset = [](void* door, std::size_t which, Mode mode, double t, X& x) {
                 return of(door).reset(which, mode, t, x);

@@ -73,16 +73,16 @@ public:
         table.guard = [](void* door, std::size_t which, Mode mode, double t, const State& x) {
             return at(door).guard(which, mode, t, x);
         };
-        table.rate = [](void* door, std::size_t which, Mode mode, bool backward, double t,
-                        const State& x, const State& dxdt, double scale) {
-            return at(door).rate(which, mode, backward, t, x, dxdt, scale);
-        };
+        table.rate = [](void* door, GuardInMode of, detail::ScaledTime time, const State& x,
+                        const State& dxdt) { return at(door).rate(of, time, x, dxdt); };
         if (table.rated) {
-            table.each_rate = [](void* door, Mode mode, double t, const State& x, const State& dxdt,
+            table.each_rate = [](void* door, const detail::Along<State>& motion,
                                  std::span<double> rates) {
                 for (std::size_t i = 0; i < rates.size(); ++i) {
                     rates[i] =
-                        at(door).is_in(i, mode) ? at(door).closed_rate(i, mode, t, x, dxdt) : 0;
+                        at(door).is_in(i, motion.mode)
+                            ? at(door).closed_rate(i, motion.mode, motion.t, motion.x, motion.s)
+                            : 0;
                 }
             };
         }
@@ -97,10 +97,8 @@ public:
                                   const State& x) { return at(door).enabled(which, mode, t, x); };
         }
         if (source.reset_set_) {
-            table.reset_set = [](void* door, std::span<const std::size_t> fired, bool on_time,
-                                 Mode mode, double t, State& x) {
-                return at(door).reset_set(fired, on_time, mode, t, x);
-            };
+            table.reset_set = [](void* door, const FiredGuards& fired, Mode mode, double t,
+                                 State& x) { return at(door).reset_set(fired, mode, t, x); };
         } else if (any(&CallbackGuard::reset)) {
             table.reset = [](void* door, std::size_t which, Mode mode, double t, State& x) {
                 const CallbackGuard& guard = at(door).source_.guards_[which];
@@ -258,18 +256,19 @@ private:
     }
 
     /// In closed form, else the central difference along the flow; see `GuardView::rate`.
-    [[nodiscard]] double rate(std::size_t which, Mode mode, bool backward, double t, const State& x,
-                              const State& dxdt, double scale)
+    [[nodiscard]] double rate(GuardInMode of, detail::ScaledTime time, const State& x,
+                              const State& dxdt)
     {
-        if (source_.guards_[which].rate) {
-            if (!backward) return closed_rate(which, mode, t, x, dxdt);
-            return -closed_rate(which, mode, t, x, detail::negated(dxdt));
+        const double t = time.t;
+        if (source_.guards_[of.which].rate) {
+            if (!of.backward) return closed_rate(of.which, of.mode, t, x, dxdt);
+            return -closed_rate(of.which, of.mode, t, x, detail::negated(dxdt));
         }
-        const double delta = 1e-5 * scale;
+        const double delta = 1e-5 * time.scale;
         const auto moved = [&](double s) {
             there_ = x;
             for (std::size_t i = 0; i < x.size(); ++i) there_[i] = x[i] + s * dxdt[i];
-            return guard(which, mode, backward ? t - s : t + s, there_);
+            return guard(of.which, of.mode, of.backward ? t - s : t + s, there_);
         };
         const double after = moved(delta);
         return (after - moved(-delta)) / (2 * delta);
@@ -323,9 +322,9 @@ private:
         return take_place(result.get(), what, of, mode, x);
     }
 
-    [[nodiscard]] Mode reset_set(std::span<const std::size_t> fired, bool on_time, Mode mode,
-                                 double t, State& x)
+    [[nodiscard]] Mode reset_set(const FiredGuards& fired, Mode mode, double t, State& x)
     {
+        const bool on_time = fired.time_event();
         const Ref list = checked(PyList_New(static_cast<Py_ssize_t>(fired.size() + on_time)));
         for (std::size_t i = 0; i < fired.size(); ++i) {
             PyList_SET_ITEM(list.get(), static_cast<Py_ssize_t>(i), PyLong_FromSize_t(fired[i]));

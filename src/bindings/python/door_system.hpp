@@ -96,7 +96,7 @@ public:
         const Interpreter held(needs_interpreter());
         if (table_->reset_set) {
             const std::array<std::size_t, 1> fired{which};
-            return table_->reset_set(at(), fired, false, mode, t, x);
+            return table_->reset_set(at(), FiredGuards(fired), mode, t, x);
         }
         return table_->reset ? table_->reset(at(), which, mode, t, x) : mode;
     }

@@ -75,9 +75,9 @@ public:
         if constexpr (requires(const State& x) {
                           this->level(system_, std::size_t{}, Mode{}, 0.0, x);
                       }) {
-            table.level = [](const void* at, void*, std::size_t which, Mode mode, double t,
-                             const State& x) {
-                const auto answer = from(at).Detector::level(from(at).system_, which, mode, t, x);
+            table.level = [](const void* at, void*, GuardInMode of, double t, const State& x) {
+                const auto answer =
+                    from(at).Detector::level(from(at).system_, of.which, of.mode, t, x);
                 return detail::GateAnswer{answer.cleared, answer.outside};
             };
         }
@@ -85,8 +85,8 @@ public:
             table.clears = [](const void* at, void*, const detail::StepState<State>& step,
                               std::uint64_t& calls) {
                 detail::Door<AskedSystem, State> door(from(at).system_, step.x0);
-                const GuardView<AskedSystem, State> guard(from(at).system_, calls, 0, step.mode,
-                                                          Crossing::falling, step.backward);
+                const GuardView<AskedSystem, State> guard(
+                    from(at).system_, calls, {.mode = step.mode, .backward = step.backward});
                 return from(at).Detector::clears(
                     guard, detail::StepToCome<AskedSystem, State>(door, step));
             };
