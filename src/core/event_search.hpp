@@ -474,15 +474,14 @@ private:
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         const Side side = bank[i].side;
+        const GuardSample start = bank.start(i), end = bank.end(i, step.h());
         if (bank[i].from == 0 && !bank[i].info.boolean && counts(side, guard.crossing()) &&
             bank.is_plain(i, step.h()) &&
-            finders_->leaves_plainly(sign_of(side), bank.start(i), bank.end(i, step.h()),
-                                     bank.touch(i, step.h()))) {
+            finders_->leaves_plainly(sign_of(side), start, end, bank.touch(i, step.h()))) {
             probe.watch(side);
             const double tolerance =
                 std::max(resolution_.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
-            const Location where =
-                finders_->locate(probe, bank.start(i), bank.end(i, step.h()), tolerance);
+            const Location where = finders_->locate(probe, start, end, tolerance);
             keep_only(i, side, where, probe.state_at(where));
             return true;
         }

@@ -58,16 +58,16 @@ public:
 
     [[nodiscard]] static SamplePoint<X> start_of(const Step<X>& step, double scale)
     {
-        return {step.mode(), step.time(0), step.x0(), step.rate0(), scale};
+        return {{step.mode(), step.time(0), step.x0(), step.rate0()}, scale};
     }
     /// As `start_of`, with the rate that the step had before it was taken.
     [[nodiscard]] static SamplePoint<X> arrival_of(const Step<X>& step, double scale)
     {
-        return {step.mode(), step.time(0), step.x0(), step.kept_rate(), scale};
+        return {{step.mode(), step.time(0), step.x0(), step.kept_rate()}, scale};
     }
     [[nodiscard]] static SamplePoint<X> end_of(const Step<X>& step)
     {
-        return {step.mode(), step.time(step.h()), step.x1(), step.rate1(), step.h()};
+        return {{step.mode(), step.time(step.h()), step.x1(), step.rate1()}, step.h()};
     }
 
     /// Samples all guards at the start of a step.

@@ -34,7 +34,7 @@ class LargeKernel {
     typedef double Four __attribute__((vector_size(32)));
 
     /// Writes dx/ds at offset s and state `step.at` into `rate`.
-    static void flow(void* door, State& step, double s, X& rate)
+    [[gnu::always_inline]] static void flow(void* door, State& step, double s, X& rate)
     {
         ++step.flow_calls;
         step.flow_fits &= step.flow(door, step.mode, step.time(s), step.at, rate);

@@ -17,10 +17,7 @@ namespace ricochet::detail {
 /// Where guards and their rates are sampled.
 template <class X>
 struct SamplePoint {
-    Mode mode;
-    double t;
-    const X& x;
-    const X& dxdt;
+    Along<X> motion;
     double scale;  ///< [s] over which the motion is taken as smooth
 };
 
@@ -76,12 +73,13 @@ protected:
     void sample(const SamplePoint<X>& at, std::uint64_t& calls, Doubles& g, Doubles& rates)
     {
         if (single && system_->point && rules_.uses_rates && !selective_) {
-            const GuardPoint both = view(0, at.mode, calls).point(at.t, at.x, at.dxdt, at.scale);
+            const GuardPoint both = view(0, at.motion.mode, calls)
+                                        .point(at.motion.t, at.motion.x, at.motion.s, at.scale);
             g[0] = both.value;
             rates[0] = both.rate;
             return;
         }
-        sample_values(at.mode, at.t, at.x, calls, g);
+        sample_values(at.motion.mode, at.motion.t, at.motion.x, calls, g);
         sample_rates(at, calls, rates);
     }
 
@@ -98,7 +96,7 @@ protected:
         if (system_->rates) {
             rates_together(at, rates);
         } else if (system_->each_rate && !selective_ && !backward_) {
-            system_->each_rate(system_.door(), {at.mode, at.t, at.x, at.dxdt}, all(rates));
+            system_->each_rate(system_.door(), at.motion, all(rates));
         } else if (!system_->each_rate && !system_->guard_alone) {
             difference(at, rates);
             calls += 2 * size();
@@ -113,15 +111,16 @@ protected:
 
     [[nodiscard]] double rate_alone(std::size_t i, const SamplePoint<X>& at, std::uint64_t& calls)
     {
-        return view(i, at.mode, calls).rate(at.t, at.x, at.dxdt, at.scale);
+        return view(i, at.motion.mode, calls).rate(at.motion.t, at.motion.x, at.motion.s, at.scale);
     }
 
     /// Rates of all guards from the system in one call.
     void rates_together(const SamplePoint<X>& at, Doubles& rates)
     {
         void* const door = system_.door();
-        if (!backward_) return system_->rates(door, {at.mode, at.t, at.x, at.dxdt}, all(rates));
-        system_->rates(door, {at.mode, at.t, at.x, negated(at.dxdt)}, all(rates));
+        if (!backward_) return system_->rates(door, at.motion, all(rates));
+        system_->rates(door, {at.motion.mode, at.motion.t, at.motion.x, negated(at.motion.s)},
+                       all(rates));
         for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
     }
 
@@ -130,11 +129,11 @@ protected:
     {
         const double delta = 1e-5 * at.scale;
         const double ahead = backward_ ? -delta : delta;
-        if (there_.size() != at.x.size()) there_ = at.x;
-        detail::move(there_, at.x, delta, at.dxdt);
-        system_->guards(system_.door(), at.mode, at.t + ahead, there_, all(rates));
-        detail::move(there_, at.x, -delta, at.dxdt);
-        system_->guards(system_.door(), at.mode, at.t - ahead, there_, all(behind_));
+        if (there_.size() != at.motion.x.size()) there_ = at.motion.x;
+        detail::move(there_, at.motion.x, delta, at.motion.s);
+        system_->guards(system_.door(), at.motion.mode, at.motion.t + ahead, there_, all(rates));
+        detail::move(there_, at.motion.x, -delta, at.motion.s);
+        system_->guards(system_.door(), at.motion.mode, at.motion.t - ahead, there_, all(behind_));
         for (std::size_t i = 0; i < size(); ++i) {
             rates[i] = records_[i].info.boolean ? 0 : (rates[i] - behind_[i]) / (2 * delta);
         }

@@ -259,8 +259,27 @@ protected:
         return false;
     }
 
-    struct OwnScreen {
-        Suspects* suspects;
+    class OwnScreen {
+    public:
+        explicit OwnScreen(Suspects* function) noexcept : function_(function) {}
+
+        [[nodiscard, gnu::always_inline]] bool suspects(double sign, const GuardSample& start,
+                                                        const GuardSample& end) const
+        {
+            return ask(function_, sign, {start.value, start.rate}, {end.value, end.rate}, end.s);
+        }
+
+    private:
+        /// Takes numbers, which are in registers: samples in memory, for a function that is not
+        /// inlined, would burden the callers for the sake of detectors that are rarely used.
+        [[nodiscard, gnu::noinline]] static bool ask(Suspects* function, double sign,
+                                                     GuardPoint start, GuardPoint end, double h)
+        {
+            return function(sign, {.s = 0, .value = start.value, .rate = start.rate},
+                            {.s = h, .value = end.value, .rate = end.rate});
+        }
+
+        Suspects* function_;
     };
 
     /// Calls `use` with the detector's own screening function, inlined.
