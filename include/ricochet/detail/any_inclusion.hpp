@@ -298,11 +298,8 @@ public:
             // Works on copies, since the output may overlap the input.
             const State at = by_components(w.data());
             State motion;
-            if (terms.diagonal) {
-                free_rate<true>(terms, t, at, motion);
-            } else {
-                free_rate<false>(terms, t, at, motion);
-            }
+            terms.diagonal ? free_rate<true>(terms, t, at, motion)
+                           : free_rate<false>(terms, t, at, motion);
             const Reaction acting = reactions(terms, mode, t, at, motion);
             add_reactions(terms, acting, motion);
             for_each_component(motion, [&](auto i) { out.rate[i] = motion[i]; });
