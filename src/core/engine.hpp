@@ -108,6 +108,13 @@ protected:
         ended_ = true;
     }
 
+    /// Forgets what ended a run before.
+    void forget_cause() noexcept
+    {
+        run_.guard = run_.other_guard = no_guard;
+        run_.wrong_bound.reset();
+    }
+
     void add_evidence(Evidence evidence, std::uint64_t steps) noexcept;
 
     // --- time events ---

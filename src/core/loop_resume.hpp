@@ -126,8 +126,7 @@ void Loop<X, single>::go_back_to_mark()
     run_.trajectory.x.resize(samples);
     run_.solution.shrink(pieces);
     run_.outcome = Outcome::reached_end;
-    run_.guard = run_.other_guard = no_guard;
-    run_.wrong_bound.reset();
+    this->forget_cause();
     next_sample_ = mark.next_sample;
     ended_ = false;
     pending_ = Engine::Pending::nothing;

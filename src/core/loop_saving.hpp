@@ -81,10 +81,7 @@ template <class Visitor>
 inline void Loop<X, single>::visit_cause(Visitor&& visit)
 {
     constexpr bool saves = std::remove_cvref_t<Visitor>::saves;
-    if constexpr (!saves) {
-        run_.guard = run_.other_guard = no_guard;
-        run_.wrong_bound.reset();
-    }
+    if constexpr (!saves) this->forget_cause();
     if (!ended_) return;
     visit(run_.guard);
     visit(run_.other_guard);

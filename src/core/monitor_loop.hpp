@@ -71,8 +71,7 @@ public:
         this->refuse_bad_modes();
         ended_ = resting_ = this->stops_ = false;
         run_.outcome = Outcome::reached_end;
-        run_.guard = run_.other_guard = no_guard;
-        run_.wrong_bound.reset();
+        this->forget_cause();
         this->pending_ = Pending::nothing;
         this->level_ = 0;
         search_.fired().clear();
@@ -203,8 +202,7 @@ public:
             throw;
         }
         step_.restart(place_);
-        run_.guard = run_.other_guard = no_guard;
-        run_.wrong_bound.reset();
+        this->forget_cause();
         this->pending_ = Pending::nothing;
         started_ = true;
         if (guarded_) search_.begin(step_.x0());

@@ -268,16 +268,23 @@ struct Squares {
     return {(distance - reach) * (distance + reach), dot(dp, dv), 2 * reach * rounding};
 }
 
-/// Meeting of two straight flights, or of two with the same acceleration. The discriminant is
-/// formed from the reach and the distance at which the paths pass, so a small reach keeps its
+/// Of the equation for the meeting of two straight flights; negative where they pass each other.
+/// Formed from the reach and the distance at which the paths pass, so a small reach keeps its
 /// digits.
+[[nodiscard]] inline double discriminant(const Vector2& dp, const Vector2& dv,
+                                         double reach) noexcept
+{
+    const double passing = dp[0] * dv[1] - dp[1] * dv[0];
+    return dot(dv, dv) * (reach * reach) - passing * passing;
+}
+
+/// Meeting of two straight flights, or of two with the same acceleration.
 [[nodiscard]] inline double straight(const Squares& now, const Vector2& dp, const Vector2& dv,
                                      double reach) noexcept
 {
     if (now.rate >= 0) return never;
     if (now.at_once <= 0) return 0;
-    const double passing = dp[0] * dv[1] - dp[1] * dv[0];
-    const double square = dot(dv, dv) * (reach * reach) - passing * passing;
+    const double square = discriminant(dp, dv, reach);
     if (square < 0) return never;
     return now.at_once / (std::sqrt(square) - now.rate);
 }
@@ -303,13 +310,12 @@ struct Squares {
     const double rate = dot(dp, dv);
     const double square = dot(dp, dp) - reach * reach;
     const bool far = square > 1e-6 * reach * reach;
-    const double passing = dp[0] * dv[1] - dp[1] * dv[0];
-    const double discriminant = dot(dv, dv) * (reach * reach) - passing * passing;
+    const double under_root = discriminant(dp, dv, reach);
     // One branch for most pairs: whether they approach cannot be predicted.
-    if ((rate >= 0) | (far & (discriminant < 0))) return {};
+    if ((rate >= 0) | (far & (under_root < 0))) return {};
     if (far) {
         // Far from touching the sum of squares keeps its digits.
-        return {.from = from, .after = square / (std::sqrt(discriminant) - rate)};
+        return {.from = from, .after = square / (std::sqrt(under_root) - rate)};
     }
     const Squares now = squares(dp, dv, reach, 0);
     if (now.at_once <= 4 * reach * World::rounding(pa, reach) && -rate <= noise(va, vb) * reach) {
