@@ -145,6 +145,7 @@ public:
     Divider(const std::vector<Reach>& reaches, std::vector<std::uint32_t>& order)
         : reaches_(reaches), order_(order)
     {
+        reserve_large(ends, order.size());
     }
 
     /// Separates [begin, end) into parts along an axis, and divides these along the other one.
@@ -157,20 +158,19 @@ public:
             return reaches_[a].low[axis] < reaches_[b].low[axis];
         };
         if (!std::is_sorted(first, last, precedes)) std::sort(first, last, precedes);
-        std::vector<std::size_t> cuts;
+        std::size_t from = begin;
         double top = reaches_[order_[begin]].high[axis];
         for (std::size_t k = begin + 1; k < end; ++k) {
-            if (reaches_[order_[k]].low[axis] > top) cuts.push_back(k);
-            top = std::max(top, reaches_[order_[k]].high[axis]);
+            const Reach& reach = reaches_[order_[k]];
+            const double below = top;
+            top = std::max(top, reach.high[axis]);
+            if (reach.low[axis] <= below) continue;
+            divide(from, k, 1 - axis, false);
+            from = k;
         }
-        if (cuts.empty() && tried) return close(begin, end);
-        const bool whole = cuts.empty();
-        cuts.push_back(end);
-        std::size_t from = begin;
-        for (const std::size_t cut : cuts) {
-            divide(from, cut, 1 - axis, whole);
-            from = cut;
-        }
+        const bool whole = from == begin;
+        if (whole && tried) return close(begin, end);
+        divide(from, end, 1 - axis, whole);
     }
 
     std::vector<std::size_t> ends;  ///< of parts, ascending

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <iterator>
 #include <vector>
 
 #if defined(__linux__)
@@ -17,17 +18,21 @@ template <class T>
 void reserve_large(std::vector<T>& list, std::size_t count)
 {
     if (count <= list.capacity()) return;
-    list.reserve(count);
+    std::vector<T> larger;
+    larger.reserve(count);
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
     constexpr std::uintptr_t page = 1U << 21;
-    const auto begin = (reinterpret_cast<std::uintptr_t>(list.data()) + page - 1) & ~(page - 1);
-    const auto end = reinterpret_cast<std::uintptr_t>(list.data() + list.capacity()) & ~(page - 1);
+    const auto begin = (reinterpret_cast<std::uintptr_t>(larger.data()) + page - 1) & ~(page - 1);
+    const auto end =
+        reinterpret_cast<std::uintptr_t>(larger.data() + larger.capacity()) & ~(page - 1);
     if (begin < end) {
         // Where this is refused the memory is usable, but slower.
         // NOLINTNEXTLINE(performance-no-int-to-ptr): begin is rounded up to a page
         static_cast<void>(madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE));
     }
 #endif
+    larger.assign(std::make_move_iterator(list.begin()), std::make_move_iterator(list.end()));
+    list.swap(larger);
 }
 
 /// Asks for a record before it is used.

@@ -65,8 +65,10 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
                         std::vector<SceneEvent> events, Samples& samples)
 {
     begin(bodies_of_group, std::move(events));
+    const bool bounces = bounces_from_start();
+    if (bounces && flies_past_end(members_.front())) return std::move(result_);
     place_all();
-    settle_at_start();
+    if (!bounces) settle_at_start();
     for (const std::uint32_t island : islands_) step_island(island);
     for (const std::uint32_t i : members_) predict(i);
     fail_where_broken();

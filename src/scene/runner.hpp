@@ -146,6 +146,9 @@ private:
     void apply(bool struck);
     std::uint32_t begin_record(std::uint32_t i, const Vector2& velocity,
                                const std::vector<Side>& sides);
+    [[nodiscard]] bool flies_above_one_wall(const Body& body) const;
+    bool bounces_from_start();
+    [[nodiscard]] bool flies_past_end(std::uint32_t i) const;
     void bounce(std::uint32_t i);
     bool collapses(std::uint32_t slot);
     bool hops_below_rounding(std::uint32_t slot);

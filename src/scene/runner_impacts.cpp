@@ -435,72 +435,12 @@ void Runner::apply(bool struck)
     if (result_.failure) return;
     for (const std::uint32_t i : changed_) {
         if (world_.bodies[i].island != none || world_.bodies[i].contact != none) continue;
-        if (members_.size() == 1) bounce(i);
+        bounce(i);
         predict(i);
     }
     for (const std::uint32_t island : islands) {
         for (const std::uint32_t i : world_.islands->members(island)) predict(i);
     }
-}
-
-/// Bounces a body alone that has just left the only wall: flight after flight, each lasting twice
-/// the time to its top. Times are sums of multiples of a unit, which are exact, and of the
-/// remainder.
-void Runner::bounce(std::uint32_t i)
-{
-    Body& body = world_.bodies[i];
-    if (world_.faces.size() != 1 || world_.wall_count != 1 || body.held != none) return;
-    const Face& wall = world_.faces[0];
-    const Vector2 along = turned(wall.normal);
-    const double pull = dot(world_.gravity, wall.normal);
-    const double restitution = world_.restitution(body.material, wall.material);
-    double leaves = dot(body.v, wall.normal);
-    double slip = dot(body.v, along);
-    if (!(pull < 0) || !(leaves > 0) || world_.options.elastic_within > 0) return;
-    if (world_.friction(body.material, wall.material) > 0 && slip != 0) return;
-    const auto& times = world_.options.sample_times;
-    const double stop =
-        next_sample_ < times.size() ? std::min(times[next_sample_], t_end_.value) : t_end_.value;
-    const double unit =
-        0x1p51 * 16 * resolution({stop, 0});  // what is added to it is rounded to its ulp
-    const double twice = -2 / pull;
-    const double shortest = resolution({stop, 0});
-    const double side_pull = dot(world_.gravity, along);
-    const std::uint64_t most =
-        world_.options.max_events - std::min(world_.options.max_events, result_.event_count);
-    const bool recorded = world_.options.record_events;
-    double whole = body.t.value;
-    double rest = body.t.remainder;
-    double moved = 0;
-    std::uint64_t count = 0;
-    for (; count + 1 < most; ++count) {
-        const double flight = leaves * twice;
-        const double part = (flight + unit) - unit;
-        if (whole + part + rest + (flight - part) > stop || flight <= shortest) break;
-        whole += part;
-        rest += flight - part;
-        const double arrives = slip + side_pull * flight;
-        moved += flight * (slip + 0.5 * side_pull * flight);
-        slip = arrives;
-        if (recorded) {
-            SceneEvent event{.t = whole + rest, .number = result_.event_count + count, .body = i};
-            event.other = {true, wall.surface};
-            event.before[0] = slip * along - leaves * wall.normal;
-            event.impulse = ((1 + restitution) * leaves / body.inverse_mass) * wall.normal;
-            event.after[0] = slip * along + (restitution * leaves) * wall.normal;
-            result_.events.push_back(event);
-        }
-        leaves *= restitution;
-    }
-    if (count == 0) return;
-    body.p = body.p + moved * along;
-    body.v = slip * along + leaves * wall.normal;
-    body.t = Instant{whole, 0}.after(rest);
-    now_ = body.t;
-    ++body.version;
-    result_.event_count += count;
-    world_.statistics.impacts += count;
-    if (leaves == 0) settle(i, none);
 }
 
 /// Continues a system from the state to which its discs have been pushed.

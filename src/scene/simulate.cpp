@@ -48,8 +48,8 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
 {
     std::optional<Failure> failure;
     const auto groups = groups_of(world);
-    run.samples.assign(world.options.sample_times.size(),
-                       std::vector<BodyState>(world.bodies.size()));
+    run.samples.resize(world.options.sample_times.size());
+    for (auto& row : run.samples) row.resize(world.bodies.size());
     Runner runner(world, t_end);
     for (std::size_t number = 0; number < groups.size(); ++number) {
         const auto group = groups[number];

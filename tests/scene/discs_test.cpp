@@ -188,6 +188,79 @@ TEST(Discs, BallsThatMeetNoneBounceAsEachDoesByItself)
     }
 }
 
+TEST(Discs, ABallAloneBouncesFromTheStartAsAfterASearch)
+{
+    // A sample at the start makes the run search for the first impact; otherwise it is computed
+    // directly. The cases are inclined, slow, inelastic, with friction, and beginning at a late
+    // time.
+    std::mt19937_64 random(7);
+    const auto any = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    std::size_t impacts = 0;
+    for (int k = 0; k < 2000; ++k) {
+        const double incline = k % 3 == 0 ? any(-1, 1) : 0;
+        const double pull = k % 5 == 0 ? any(-0.5, 0.5) : 0;
+        Scene scene({.gravity = {9.81 * std::sin(pull), -9.81 * std::cos(pull)}});
+        const std::array restitutions{0.0, 1e-9, 0.5, 0.9, 1.0};
+        const MaterialId material =
+            scene.material({.restitution = restitutions[static_cast<std::size_t>(k) % 5],
+                            .friction = k % 4 == 0 ? 0.3 : 0});
+        const Vector2 normal{std::sin(incline), std::cos(incline)};
+        scene.wall({.normal = normal, .material = material});
+        const double height = 0.25 + (k % 7 == 0 ? 1e-12 : any(0, 3));
+        scene.disc({.at = {height * normal[0], height * normal[1]},
+                    .velocity = {k % 2 == 0 ? 0 : any(-2, 2), any(-2, 2)},
+                    .radius = 0.25,
+                    .mass = any(0.5, 2),
+                    .material = material});
+        SceneOptions options{.t_start = k % 6 == 0 ? any(-1e3, 1e3) : 0};
+        options.t_end = options.t_start + any(0.5, 5);
+        const SceneRun direct = simulate(scene, options);
+        options.sample_times = {options.t_start};
+        const SceneRun searched = simulate(scene, options);
+        ASSERT_EQ(direct.outcome, searched.outcome) << k;
+        ASSERT_EQ(direct.statistics.impacts, searched.statistics.impacts) << k;
+        ASSERT_EQ(direct.events.size(), searched.events.size()) << k;
+        for (std::size_t e = 0; e < direct.events.size(); ++e) {
+            EXPECT_EQ(direct.events[e].t, searched.events[e].t) << k;
+            EXPECT_EQ(direct.events[e].before, searched.events[e].before) << k;
+            EXPECT_EQ(direct.events[e].after, searched.events[e].after) << k;
+            EXPECT_EQ(direct.events[e].impulse, searched.events[e].impulse) << k;
+        }
+        EXPECT_EQ(direct.bodies[0].at, searched.bodies[0].at) << k;
+        EXPECT_EQ(direct.bodies[0].velocity, searched.bodies[0].velocity) << k;
+        EXPECT_EQ(direct.bodies[0].asleep, searched.bodies[0].asleep) << k;
+        impacts += direct.statistics.impacts;
+    }
+    EXPECT_GT(impacts, 10'000u);
+}
+
+TEST(Discs, FrictionActsAtEveryBounceWhereGravityPullsAlongTheWall)
+{
+    // The first impact stops the slip, and gravity makes the ball slip again. With a second wall,
+    // far away, the ball is the same.
+    const auto run = [](bool second_wall) {
+        Scene scene({.gravity = {1, -9.81}});
+        const MaterialId rough = scene.material({.restitution = 0.5, .friction = 0.9});
+        scene.wall({.normal = {0, 1}, .material = rough});
+        if (second_wall) scene.wall({.point = {-1000, 0}, .normal = {1, 0}, .material = rough});
+        scene.disc(
+            {.at = {0, 1.3}, .velocity = {0.3, 0}, .radius = 0.25, .mass = 1, .material = rough});
+        return simulate(scene, {.t_end = 1.2});
+    };
+    const SceneRun one = run(false);
+    const SceneRun two = run(true);
+    ASSERT_EQ(one.events.size(), 3u);
+    ASSERT_EQ(two.events.size(), 3u);
+    for (std::size_t k = 0; k < 3; ++k) {
+        EXPECT_NEAR(one.events[k].t, two.events[k].t, 1e-14);
+        EXPECT_NEAR(one.events[k].after[0][0], 0, 1e-15);  // friction stops the slip
+        EXPECT_NEAR(two.events[k].after[0][0], 0, 1e-15);
+    }
+    EXPECT_NEAR(one.bodies[0].at[0], two.bodies[0].at[0], 1e-14);
+}
+
 TEST(Discs, WhatACeilingSendsBackMeetsOthers)
 {
     // With g = 0.2: the lower disc reaches the ceiling at 9 after 1.0 s and comes back, where it

@@ -1,0 +1,137 @@
+// A disc alone above the only wall, whose flights and impacts have closed forms.
+#include <algorithm>
+
+#include "scene/runner.hpp"
+
+namespace ricochet::detail {
+
+/// Whether a body can only fly above the only wall and strike it, with no push along the wall.
+bool Runner::flies_above_one_wall(const Body& body) const
+{
+    if (members_.size() != 1 || world_.faces.size() != 1 || world_.wall_count != 1) return false;
+    if (body.held != none || body.island != none || world_.options.elastic_within > 0) return false;
+    const Face& wall = world_.faces[0];
+    if (!(dot(world_.gravity, wall.normal) < 0)) return false;
+    if (world_.friction(body.material, wall.material) == 0) return true;
+    const Vector2 along = turned(wall.normal);
+    return dot(body.v, along) == 0 && dot(world_.gravity, along) == 0;
+}
+
+/// Takes a disc from the start through its first impact and the bounces after it, with the
+/// arithmetic of `impact` but without a search for contacts. Returns false, with nothing changed,
+/// where anything else may happen.
+bool Runner::bounces_from_start()
+{
+    const std::uint32_t i = members_.front();
+    Body& body = world_.bodies[i];
+    const SceneOptions& options = world_.options;
+    if (!flies_above_one_wall(body) || body.asleep || body.radius == 0) return false;
+    if (!options.sample_times.empty() || options.cancelled || options.max_events == 1) return false;
+    const Face& wall = world_.faces[0];
+    const double pull = dot(world_.gravity, wall.normal);
+    const double gap = dot(body.p - wall.at, wall.normal) - body.radius;
+    if (gap <= World::rounding(body.p, body.radius) + World::rounding(wall.at, 0)) return false;
+    const Instant t = body.t.after(falls_after(gap, dot(body.v, wall.normal), pull, 0));
+    if (before(t_end_, t)) return false;
+
+    const double s = seconds(body.t, t);
+    const Vector2 arrives = speed(body, s);
+    const double approach = -dot(arrives, wall.normal);
+    const double restitution = world_.restitution(body.material, wall.material);
+    const double impulse = (1 + restitution) * approach * (1 / body.inverse_mass);
+    const Vector2 leaves = arrives + body.inverse_mass * (impulse * wall.normal);
+    // Slower bodies may stay on the wall.
+    const double least = std::max(resolution(t) * norm(world_.gravity), noise(leaves, {}));
+    if (!(approach > noise(arrives, {}) && dot(leaves, wall.normal) > least)) return false;
+    if (!is_finite(leaves)) return false;
+
+    now_ = t;
+    body.p = place(body, s);
+    body.v = leaves;
+    body.t = t;
+    ++body.version;
+    series_[i] = {.since = t, .last = t, .count = 1};
+    ++world_.statistics.predictions;
+    ++world_.statistics.waves;
+    ++world_.statistics.impacts;
+    if (options.record_events) {
+        SceneEvent event{.t = t.value, .body = i, .impulse = impulse * wall.normal};
+        event.other = {true, wall.surface};
+        event.before[0] = arrives;
+        event.after[0] = leaves;
+        result_.events.push_back(event);
+    }
+    ++result_.event_count;
+    bounce(i);
+    return true;
+}
+
+/// Whether a body that has just left the only wall strikes it again only after the end of the run.
+bool Runner::flies_past_end(std::uint32_t i) const
+{
+    const Body& body = world_.bodies[i];
+    const Vector2& normal = world_.faces[0].normal;
+    const double flight = -2 * dot(body.v, normal) / dot(world_.gravity, normal);
+    return before({t_end_.value + resolution(t_end_), 0}, body.t.after(flight));
+}
+
+/// Bounces a body alone that has just left the only wall: flight after flight, each lasting twice
+/// the time to its top. Times are sums of multiples of a unit, which are exact, and of the
+/// remainder.
+void Runner::bounce(std::uint32_t i)
+{
+    Body& body = world_.bodies[i];
+    if (!flies_above_one_wall(body)) return;
+    const Face& wall = world_.faces[0];
+    const Vector2 along = turned(wall.normal);
+    const double pull = dot(world_.gravity, wall.normal);
+    const double restitution = world_.restitution(body.material, wall.material);
+    double leaves = dot(body.v, wall.normal);
+    double slip = dot(body.v, along);
+    if (!(leaves > 0)) return;
+    const auto& times = world_.options.sample_times;
+    const double stop =
+        next_sample_ < times.size() ? std::min(times[next_sample_], t_end_.value) : t_end_.value;
+    const double unit =
+        0x1p51 * 16 * resolution({stop, 0});  // what is added to it is rounded to its ulp
+    const double twice = -2 / pull;
+    const double shortest = resolution({stop, 0});
+    const double side_pull = dot(world_.gravity, along);
+    const std::uint64_t most =
+        world_.options.max_events - std::min(world_.options.max_events, result_.event_count);
+    const bool recorded = world_.options.record_events;
+    double whole = body.t.value;
+    double rest = body.t.remainder;
+    double moved = 0;
+    std::uint64_t count = 0;
+    for (; count + 1 < most; ++count) {
+        const double flight = leaves * twice;
+        const double part = (flight + unit) - unit;
+        if (whole + part + rest + (flight - part) > stop || flight <= shortest) break;
+        whole += part;
+        rest += flight - part;
+        const double arrives = slip + side_pull * flight;
+        moved += flight * (slip + 0.5 * side_pull * flight);
+        slip = arrives;
+        if (recorded) {
+            SceneEvent event{.t = whole + rest, .number = result_.event_count + count, .body = i};
+            event.other = {true, wall.surface};
+            event.before[0] = slip * along - leaves * wall.normal;
+            event.impulse = ((1 + restitution) * leaves / body.inverse_mass) * wall.normal;
+            event.after[0] = slip * along + (restitution * leaves) * wall.normal;
+            result_.events.push_back(event);
+        }
+        leaves *= restitution;
+    }
+    if (count == 0) return;
+    body.p = body.p + moved * along;
+    body.v = slip * along + leaves * wall.normal;
+    body.t = Instant{whole, 0}.after(rest);
+    now_ = body.t;
+    ++body.version;
+    result_.event_count += count;
+    world_.statistics.impacts += count;
+    if (leaves == 0) settle(i, none);
+}
+
+}  // namespace ricochet::detail
