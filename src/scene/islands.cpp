@@ -302,8 +302,13 @@ bool Islands::record(Island& island)
             body.p[c] = island.x[k];
             body.v[c] = island.rate[k];
             body.a[c] = 2 * (16 * middle - 5 * end + slope) / (h * h);
-            world_.bends[i][0][c] = (-32 * middle + 14 * end - 3 * slope) / (h * h * h);
-            world_.bends[i][1][c] = (16 * middle - 8 * end + 2 * slope) / (h * h * h * h);
+            const double c3 = (-32 * middle + 14 * end - 3 * slope) / (h * h * h);
+            const double c4 = (16 * middle - 8 * end + 2 * slope) / (h * h * h * h);
+            const double curved =
+                0.5 * std::fabs(body.a[c]) + h * (std::fabs(c3) + h * std::fabs(c4));
+            world_.bends[i].c3[c] = c3;
+            world_.bends[i].c4[c] = c4;
+            world_.bends[i].sweep[c] = h * (std::fabs(body.v[c]) + h * curved);
         }
     }
     return true;

@@ -47,6 +47,21 @@ namespace {
     return false;
 }
 
+/// Whether two bodies are too far apart along x or y to meet in their current steps.
+[[nodiscard]] bool are_apart(const World& world, std::uint32_t i, std::uint32_t j) noexcept
+{
+    const Body& a = world.bodies[i];
+    const Body& b = world.bodies[j];
+    const Vector2& from_a = world.bends[i].sweep;
+    const Vector2& from_b = world.bends[j].sweep;
+    const double reach = a.radius + b.radius;
+    for (std::size_t c = 0; c < 2; ++c) {
+        const double moved = from_a[c] + from_b[c];
+        if (std::fabs(a.p[c] - b.p[c]) > (1 + 1e-9) * (reach + moved)) return true;
+    }
+    return false;
+}
+
 /// A gap from which a flight begins, if it is closed there. The flight then ends at the same gap up
 /// to rounding: otherwise each of many short hops would gain the energy of the difference.
 struct Departure {
@@ -95,7 +110,7 @@ Path World::path(std::uint32_t i, const Instant& t) const
         path.until = std::max(0.0, seconds(t, islands->end(b.island)));
         return path;
     }
-    const auto& [c3, c4] = bends[i];
+    const auto& [c3, c4, sweep] = bends[i];
     const Vector2 c2 = 0.5 * b.a;
     path.degree = 4;
     path.until = std::max(0.0, seconds(t, islands->end(b.island)));
@@ -132,6 +147,7 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
     const Body& a = world.bodies[i];
     const Body& b = world.bodies[j];
     if (a.mapped || b.mapped) return meet_mapped(world, i, j);
+    if (a.quartic && b.quartic && are_apart(world, i, j)) return {};
     const Instant from = later(a.t, b.t);
     const Path first = world.path(i, from);
     const Path second = world.path(j, from);

@@ -220,6 +220,7 @@ void Runner::consider_walls(std::uint32_t i)
         const double bend = dot(body.a, wall.normal);
         if (!body.quartic && rate >= 0 && bend >= 0) continue;
         const double gap = dot(body.p - wall.at, wall.normal) - body.radius;
+        if (body.quartic && gap > world_.reach_of_step(i, wall.normal)) continue;
         if (body.quartic || gap <= rounding + World::rounding(wall.at, 0)) {
             consider(i, meet_face(world_, i, f), true, f);
             continue;

@@ -125,8 +125,11 @@ struct World {
     SceneTuning tuning;
     Vector2 gravity{};
     std::vector<Body> bodies;
-    std::vector<std::array<Vector2, 2>>
-        bends;                          ///< terms of degree 3 and 4, where there are islands
+    struct Bend {
+        Vector2 c3{}, c4{};  ///< terms of degree 3 and 4
+        Vector2 sweep{};     ///< bounds of the distances along x and y from the start of the step
+    };
+    std::vector<Bend> bends;            ///< of bodies, where there are islands
     std::vector<Face> faces;            ///< walls first, then terrain, then moving faces
     std::uint32_t wall_count = 0;       ///< walls that do not move
     std::uint32_t fixed_count = 0;      ///< of these and of terrain that does not move
@@ -139,6 +142,14 @@ struct World {
     };
     std::vector<Drift> drifts;  ///< of bodies in lasting contact, where there have been any
     SceneStatistics statistics;
+
+    /// [m] Bound of the distance along a direction from the start of the current step of a body.
+    [[nodiscard]] double reach_of_step(std::uint32_t i, const Vector2& direction) const noexcept
+    {
+        const Vector2& sweep = bends[i].sweep;
+        return (1 + 1e-9) *
+               (std::fabs(direction[0]) * sweep[0] + std::fabs(direction[1]) * sweep[1]);
+    }
 
     /// From its record; by the method's own map where it advances by steps.
     [[nodiscard]] Vector2 position(std::uint32_t i, const Instant& t) const;
