@@ -106,9 +106,7 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
             fail(Outcome::step_limit, {},
                  fmt::format("max_events = {} events have happened", options.max_events));
         }
-        if (options.cancelled && options.cancelled->load(std::memory_order_relaxed)) {
-            fail(Outcome::cancelled, {}, "the run was cancelled");
-        }
+        if (is_cancelled()) fail(Outcome::cancelled, {}, "the run was cancelled");
     }
     const Instant end = result_.failure ? result_.failure->t : t_end_;
     sample_until(end, true, samples);
@@ -153,9 +151,7 @@ bool Runner::nothing_before(const Instant& t) const
 {
     const auto& times = world_.options.sample_times;
     if (next_sample_ < times.size() && !before(t, {times[next_sample_], 0})) return false;
-    const auto* cancelled = world_.options.cancelled;
-    if (cancelled && cancelled->load(std::memory_order_relaxed)) return false;
-    return before(t, t_end_);
+    return !is_cancelled() && before(t, t_end_);
 }
 
 void Runner::step_island(std::uint32_t island)

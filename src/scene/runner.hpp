@@ -108,6 +108,11 @@ private:
     void put_in_calendar(std::uint32_t i);
     void move_to_cell(std::uint32_t i);
     void cross(std::uint32_t i);
+    [[nodiscard]] bool is_cancelled() const
+    {
+        const auto* cancelled = world_.options.cancelled;
+        return cancelled && cancelled->load(std::memory_order_relaxed);
+    }
     [[nodiscard]] bool nothing_before(const Instant& t) const;
     void step_island(std::uint32_t island);
     void fail_island(std::uint32_t island);

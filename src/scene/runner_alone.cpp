@@ -105,6 +105,7 @@ void Runner::bounce(std::uint32_t i)
     double moved = 0;
     std::uint64_t count = 0;
     for (; count + 1 < most; ++count) {
+        if (count % 4096 == 0 && is_cancelled()) break;
         const double flight = leaves * twice;
         const double part = (flight + unit) - unit;
         if (whole + part + rest + (flight - part) > stop || flight <= shortest) break;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -234,6 +235,18 @@ TEST(Discs, ABallAloneBouncesFromTheStartAsAfterASearch)
         impacts += direct.statistics.impacts;
     }
     EXPECT_GT(impacts, 10'000u);
+}
+
+TEST(Discs, ABallThatBouncesAloneCanBeCancelled)
+{
+    Scene scene({.gravity = {0, -9.81}});
+    scene.wall({.normal = {0, 1}});
+    scene.disc({.at = {0, 1.5}, .radius = 0.25});
+    const std::atomic<bool> cancelled = true;
+    const SceneRun run = simulate(scene, {.t_end = 1e7, .cancelled = &cancelled});
+    EXPECT_EQ(run.outcome, Outcome::cancelled);
+    EXPECT_EQ(run.events.size(), 1u);
+    EXPECT_EQ(run.t, run.events[0].t);
 }
 
 TEST(Discs, FrictionActsAtEveryBounceWhereGravityPullsAlongTheWall)
