@@ -300,6 +300,18 @@ void Runner::put_in_calendar(std::uint32_t i)
     calendar_.set(i, before(pending.crossing, pending.t) ? pending.crossing : pending.t);
 }
 
+/// Whether the bound of its current step keeps a body in its cell and the margin around it.
+bool Runner::stays_in_cell(const Body& body, const Vector2& sweep, const Vector2& corner,
+                           double side) const
+{
+    for (std::size_t c = 0; c < 2; ++c) {
+        const double into = body.p[c] - corner[c];
+        const double nearest = std::max(std::min(into, side - into), 0.0);
+        if (sweep[c] >= nearest + grid_.outside()) return false;
+    }
+    return true;
+}
+
 void Runner::predict_crossing(std::uint32_t i)
 {
     Pending& pending = pending_[i];
@@ -309,6 +321,7 @@ void Runner::predict_crossing(std::uint32_t i)
     pending.crossing = no_instant;
     if (body.mapped) return predict_crossing_mapped(i);
     if (body.quartic) {
+        if (stays_in_cell(body, world_.bends[i].sweep, corner, side)) return;
         const Path path = world_.path(i, now_);
         double first = path.until;
         for (std::size_t c = 0; c < 2; ++c) {
@@ -377,8 +390,10 @@ void Runner::predict_crossing_mapped(std::uint32_t i)
 /// Moves a body into the cell to which a step has led it.
 void Runner::move_to_cell(std::uint32_t i)
 {
-    const Instant& t = world_.bodies[i].t;
-    grid_.move(world_.bodies, i, pending_[i].cell, world_.path(i, before(now_, t) ? t : now_).c[0]);
+    const Body& body = world_.bodies[i];
+    const bool later = body.mapped || before(body.t, now_);
+    grid_.move(world_.bodies, i, pending_[i].cell,
+               later ? world_.path(i, before(now_, body.t) ? body.t : now_).c[0] : body.p);
 }
 
 void Runner::cross(std::uint32_t i)

@@ -103,6 +103,8 @@ private:
     void consider_moving(std::uint32_t i);
     void consider_own(std::uint32_t i);
     void offer(std::uint32_t i);
+    [[nodiscard]] bool stays_in_cell(const Body& body, const Vector2& sweep, const Vector2& corner,
+                                     double side) const;
     void predict_crossing(std::uint32_t i);
     void predict_crossing_mapped(std::uint32_t i);
     void put_in_calendar(std::uint32_t i);
