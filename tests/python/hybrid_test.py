@@ -507,3 +507,14 @@ def test_functions_of_numba():
 
     result = ricochet.solve_ivp(ricochet.Compiled(flow), (0, 1), [10.0, 0.0])
     assert result.y[0, -1] == pytest.approx(10 - 9.81 / 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("rate", [None, lambda t, x, dxdt: dxdt[0] / (2 * np.sqrt(x[0]))])
+def test_a_rate_that_is_not_finite_on_the_surface_is_replaced_by_a_difference(rate):
+    floor = ricochet.Guard(lambda t, x: np.sqrt(x[0]), rate=rate,
+                           reset=lambda t, x: [0.0, -0.8 * x[1]])
+    system = ricochet.System(fall, [floor])
+    with np.errstate(all="ignore"):
+        run = ricochet.integrate(system, [0.0, 5.0], 2.0)
+    assert run.outcome == "reached_end"
+    np.testing.assert_allclose(run.events["t"], [10 / 9.81, 18 / 9.81], rtol=1e-9)

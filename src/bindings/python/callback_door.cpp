@@ -1,6 +1,7 @@
 // The functions of a system of callbacks, as a run calls them.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -8,6 +9,7 @@
 #include "callbacks.hpp"
 #include "formula_door.hpp"
 #include "numbers.hpp"
+#include "ricochet/detail/guard_view.hpp"
 
 namespace ricochet::python {
 
@@ -255,14 +257,17 @@ private:
         return as_guard(result.get(), "rate of " + guard.owner);
     }
 
-    /// In closed form, else the central difference along the flow; see `GuardView::rate`.
+    /// In closed form where that is finite, else the difference along the flow; see
+    /// `GuardView::rate`.
     [[nodiscard]] double rate(GuardInMode of, detail::ScaledTime time, const State& x,
                               const State& dxdt)
     {
         const double t = time.t;
         if (source_.guards_[of.which].rate) {
-            if (!of.backward) return closed_rate(of.which, of.mode, t, x, dxdt);
-            return -closed_rate(of.which, of.mode, t, x, detail::negated(dxdt));
+            const double known =
+                of.backward ? -closed_rate(of.which, of.mode, t, x, detail::negated(dxdt))
+                            : closed_rate(of.which, of.mode, t, x, dxdt);
+            if (std::isfinite(known)) return known;
         }
         const double delta = 1e-5 * time.scale;
         const auto moved = [&](double s) {
@@ -270,8 +275,11 @@ private:
             for (std::size_t i = 0; i < x.size(); ++i) there_[i] = x[i] + s * dxdt[i];
             return guard(of.which, of.mode, of.backward ? t - s : t + s, there_);
         };
-        const double after = moved(delta);
-        return (after - moved(-delta)) / (2 * delta);
+        const double ahead = moved(delta);
+        const double behind = moved(-delta);
+        const double central = (ahead - behind) / (2 * delta);
+        if (std::isfinite(central)) return central;
+        return detail::one_sided(guard(of.which, of.mode, t, x), ahead, behind, delta);
     }
 
     [[nodiscard]] bool enabled(std::size_t which, Mode mode, double t, const State& x)
