@@ -93,7 +93,7 @@ inline double EventEngine<X, single>::distance_put_back(std::size_t i)
 template <class X, bool single>
 inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, double error)
 {
-    if (!system_->rest) return end(Outcome::zeno, i);
+    if (!system_->rest || bank_[i].intervals.outlast_rest()) return end(Outcome::zeno, i);
     if (resting_ || ended_) return;
     const X before = step_.x0();
     const Mode mode = step_.mode();
@@ -131,7 +131,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     for (const std::size_t k : search_.fired()) {
         bank_[k].rated_over = stale;
     }
-    bank_[i].intervals = {};
+    bank_[i].intervals.come_to_rest();
     bank_[i].band = 0;
     resting_ = bank_.size() == 1 && !system_->moded;
     if (resting_ && !stays_on_surface(i)) end(Outcome::zeno, i);

@@ -9,6 +9,7 @@
 
 #include "accumulating_systems.hpp"
 #include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate/simulation.hpp"
 
 namespace ricochet::accumulation_test {
 namespace {
@@ -378,6 +379,42 @@ TEST(Accumulation, OfBallsThatBounceTogetherIsThatOfEach)
             EXPECT_NEAR(event.t, limit, event.error + 1e-12) << k;
         }
         EXPECT_EQ(rests, 2) << k;
+    }
+}
+
+/// A guard that is not a number beyond its surface, where neither its reset nor its rest turns the
+/// motion back, beside another guard.
+struct Pressed {
+    using State = std::array<double, 1>;
+    static constexpr std::size_t guard_count = 2;
+
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        dxdt[0] = -1.1 - std::sin(t + x[0]) / 2;
+    }
+    [[nodiscard]] double guard(std::size_t which, double, const State& x) const
+    {
+        return which == 0 ? std::sqrt(x[0]) : x[0] + 100;
+    }
+    [[nodiscard]] double guard_rate(std::size_t which, double, const State& x,
+                                    const State& dxdt) const
+    {
+        return which == 0 ? dxdt[0] / (2 * std::sqrt(x[0])) : dxdt[0];
+    }
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.crossing = Crossing::either}; }
+    void reset(std::size_t, double, State&) const {}
+    void rest(std::size_t, double, State&) const {}
+};
+
+TEST(Accumulation, ARestThatLeavesTheMotionPressingOnTheEndOfAGuardEndsTheRun)
+{
+    for (const double start : {0.25, 0.5, 0.75, 1.0}) {
+        const Pressed pressed;
+        Simulation simulation(pressed, Pressed::State{start}, {.t_end = 2});
+        while (!simulation.ended() && simulation.run().events.size() < 10'000) simulation.step();
+        ASSERT_TRUE(simulation.ended()) << start;
+        EXPECT_EQ(simulation.run().outcome, Outcome::zeno) << start;
+        EXPECT_EQ(simulation.run().guard, 0u) << start;
     }
 }
 

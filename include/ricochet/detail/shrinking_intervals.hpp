@@ -31,7 +31,7 @@ public:
         stalled_ = interval < std::max(resolution(), std::numeric_limits<double>::min()) / 4
                        ? stalled_ + 1
                        : 0;
-        if (stalled_ > 100) return true;
+        if (stalled_ > most_at_once) return true;
         const double instant = std::max(resolution(), std::numeric_limits<double>::min()) / 256;
         if (interval <= instant && seen_ > 0) {  // another event of the same instant: no interval
             last_ = t;
@@ -47,6 +47,21 @@ public:
         if (seen_ == 2) longest_ = std::max(longest_, interval);
         return false;
     }
+
+    /// Begins anew after the motion has come to rest. Events that do not advance the time are
+    /// counted on: a rest need not end them.
+    void come_to_rest() noexcept
+    {
+        ShrinkingIntervals anew;
+        if (stalled_ > most_at_once) {
+            anew.last_ = last_;
+            anew.stalled_ = stalled_;
+        }
+        *this = anew;
+    }
+
+    /// Whether the time has not advanced although the motion has come to rest a hundred times.
+    [[nodiscard]] bool outlast_rest() const noexcept { return stalled_ > 2 * most_at_once; }
 
     /// Whether a guard that leaves its surface at `rate` [1/s] after the event just recorded
     /// will rise so little, or so briefly, compared with earlier excursions, that its
@@ -179,6 +194,8 @@ public:
     }
 
 private:
+    static constexpr std::uint32_t most_at_once = 100;  ///< events that do not advance the time
+
     /// Height of the next excursion: a parabola that leaves at `rate`, for an interval that
     /// shrinks as the last one did, rises by rate * interval / 4.
     [[nodiscard]] double rise(double rate) const noexcept
