@@ -7,7 +7,9 @@
 #include <cstring>
 #include <sstream>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "app.hpp"
@@ -226,6 +228,29 @@ TEST_F(EnsembleApp, HalfABlockAndAByteThatChangedAreRunAgain)
     write("out/share-1-of-1.rows", changed);
     EXPECT_GT(json(words)["rows_run"], 0);
     EXPECT_EQ(results("out"), expected);
+}
+
+TEST_F(EnsembleApp, AShareWhoseFirstLineHasChangedIsRefused)
+{
+    const Words words = balls("100", {"--out", "out"});
+    expect_fine(words);
+    const std::string whole = content(work() / "out" / "share-1-of-1.rows");
+    const auto changed = [&](std::string_view from, std::string_view to) {
+        std::string bytes = whole;
+        bytes.replace(bytes.find(from), from.size(), to);
+        write("out/share-1-of-1.rows", bytes);
+    };
+    for (const auto& [from, to] : {std::pair("\"v_final\"", "\"w_final\""),
+                                   std::pair("\"rows\":100", "\"rows\":101"),
+                                   std::pair("\"rows\":100", "\"rows\":\"1\""),
+                                   std::pair("\"rows\":100", "\"rows\":0"),
+                                   std::pair("\"check\"", "\"chick\"")}) {
+        changed(from, to);
+        expect_refused({"ensemble", "--merge", "out"}, {"first line", "was changed"});
+        expect_refused(words, {"first line", "was changed"});
+    }
+    write("out/share-1-of-1.rows", whole);
+    expect_fine({"ensemble", "--merge", "out"});
 }
 
 TEST_F(EnsembleApp, ARowThatCannotBeRunIsAnOutcome)

@@ -50,6 +50,19 @@ std::string read_up_to(std::ifstream& in, std::uint64_t bytes)
     return out;
 }
 
+std::string check_of(const Json& setup)
+{
+    return fmt::format("{:016x}", checksum(setup.dump()));
+}
+
+/// The first line of a share: its set-up and a checksum of it.
+std::string first_line(Json setup)
+{
+    const std::string check = check_of(setup);
+    setup["check"] = check;
+    return setup.dump() + '\n';
+}
+
 /// The set-up in the first line; `in` is left after it.
 Json setup_of(const fs::path& file, std::ifstream& in)
 {
@@ -58,6 +71,13 @@ Json setup_of(const fs::path& file, std::ifstream& in)
     Json setup = Json::parse(line, nullptr, false);
     if (!setup.is_object() || !setup.contains("fields") || !setup.contains("rows")) {
         throw BadInput(fmt::format("'{}' is no share of an ensemble", shortened(file.string())));
+    }
+    const Json check = setup.value("check", Json());
+    setup.erase("check");
+    if (check != check_of(setup)) {
+        throw BadInput(fmt::format(
+            "the first line of '{}' was changed after it was written, or another version wrote it",
+            shortened(file.string())));
     }
     return setup;
 }
@@ -210,7 +230,7 @@ ShareFile::ShareFile(const fs::path& directory, const Share& share, const Json& 
             throw BadInput(fmt::format("another process runs share {} in '{}'", to_string(share),
                                        shortened(directory.string())));
         }
-        begin(setup.dump() + '\n');
+        begin(first_line(setup));
         // First the set-up: rows of another one have other fields.
         std::ifstream kept(file_, std::ios::binary);
         if (const std::string other = difference(setup_of(file_, kept), setup); !other.empty()) {
