@@ -4,6 +4,8 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstdint>
+#include <utility>
 
 namespace ricochet::detail {
 
@@ -56,24 +58,46 @@ Box box_of(const World& world, std::span<const std::uint32_t> members)
     return std::bit_ceil(static_cast<std::uint32_t>(std::ceil(count)));
 }
 
-/// A face lies in every bucket from which a body can touch it.
+/// The least and the greatest height of the line from a to b between `left` and `right`.
+std::pair<double, double> heights(const Vector2& a, const Vector2& b, double left, double right)
+{
+    if (a[0] == b[0]) return std::minmax({a[1], b[1]});
+    const auto height = [&](double x) {
+        return a[1] + std::clamp((x - a[0]) / (b[0] - a[0]), 0.0, 1.0) * (b[1] - a[1]);
+    };
+    return std::minmax({height(left), height(right)});
+}
+
+/// A face lies in every bucket from which a body can touch it. One that is as long as very many
+/// cells, or as far away, lies in all buckets.
 void place_faces(const World& world, double reach, Cells& cells)
 {
+    constexpr double most = 1 << 20;               // cells along a face
+    constexpr double far = std::int64_t{1} << 52;  // whose number is still a whole one
+    const double side = cells.side();
+    const double radius = reach + 0.7072 * side;
+    const auto row_of = [&](double y) { return cells.cell_of({0, y}).y; };
     for (std::uint32_t f = world.wall_count; f < world.fixed_count; ++f) {
         const Face& face = world.faces[f];
         const Vector2 end = face.at - face.length * turned(face.normal);
-        const auto from = cells.cell_of(
-            {std::min(face.at[0], end[0]) - reach, std::min(face.at[1], end[1]) - reach});
-        const auto to = cells.cell_of(
-            {std::max(face.at[0], end[0]) + reach, std::max(face.at[1], end[1]) + reach});
+        const auto [left, right] = std::minmax({face.at[0], end[0]});
+        const auto [low, high] = std::minmax({face.at[1], end[1]});
+        const double farthest = std::max({-left, right, -low, high});
+        if (!(right - left + high - low < most * side && farthest + reach < far * side)) {
+            for (std::uint32_t b = 0; b < cells.buckets(); ++b) cells.add_face(b, f);
+            continue;
+        }
+        const auto from = cells.cell_of({left - reach, low - reach});
+        const auto to = cells.cell_of({right + reach, high + reach});
         for (std::int64_t x = from.x; x <= to.x; ++x) {
-            for (std::int64_t y = from.y; y <= to.y; ++y) {
-                const Vector2 middle{(static_cast<double>(x) + 0.5) * cells.side(),
-                                     (static_cast<double>(y) + 0.5) * cells.side()};
+            const double across = (static_cast<double>(x) + 0.5) * side;
+            const auto [lowest, highest] = heights(face.at, end, across - radius, across + radius);
+            const std::int64_t first = std::max(from.y, row_of(lowest - radius) - 1);
+            const std::int64_t last = std::min(to.y, row_of(highest + radius) + 1);
+            for (std::int64_t y = first; y <= last; ++y) {
+                const Vector2 middle{across, (static_cast<double>(y) + 0.5) * side};
                 const double apart = norm(middle - nearest_on(face.at, end, middle));
-                if (apart <= reach + 0.7072 * cells.side()) {
-                    cells.add_face(cells.bucket_of(x, y), f);
-                }
+                if (apart <= radius) cells.add_face(cells.bucket_of(x, y), f);
             }
         }
     }

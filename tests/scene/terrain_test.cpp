@@ -235,5 +235,31 @@ TEST(Terrain, SmallDiscsInPolygonsStayInside)
     for (std::uint64_t seed = 0; seed < 4000; ++seed) stays_inside(seed, 0.01);
 }
 
+TEST(Terrain, ALineLongerThanAnyNumberOfCellsIsStruckWhereItIs)
+{
+    constexpr double radius = 0.1;
+    for (const Vector2& end : {Vector2{1e5, 1e5}, Vector2{1e12, 0.0}}) {
+        Scene scene({.gravity = {0, -10}});
+        scene.terrain({.points = {{-end[0], -end[1]}, end}});
+        const double slope = end[1] / end[0];
+        for (int i = 0; i < 30; ++i) {
+            const double x = 0.5 * i;
+            // It falls by i + 1 centimetres.
+            const double above = radius * std::sqrt(1 + slope * slope) + 0.01 * (i + 1);
+            scene.disc({.at = {x, slope * x + above}, .radius = radius, .mass = 1});
+        }
+        const SceneRun run = simulate(scene, {.t_end = 0.3, .contacts = scene_contacts()});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+        std::vector<double> first(30, 1);
+        for (const SceneEvent& event : run.events) {
+            first[event.body] = std::min(first[event.body], event.t);
+        }
+        for (int i = 0; i < 30; ++i) {
+            const auto body = static_cast<std::size_t>(i);
+            EXPECT_NEAR(first[body], std::sqrt(0.002 * (i + 1)), 1e-9) << end[0] << ", disc " << i;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace ricochet::terrain_test
