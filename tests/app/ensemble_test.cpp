@@ -240,11 +240,10 @@ TEST_F(EnsembleApp, AShareWhoseFirstLineHasChangedIsRefused)
         bytes.replace(bytes.find(from), from.size(), to);
         write("out/share-1-of-1.rows", bytes);
     };
-    for (const auto& [from, to] : {std::pair("\"v_final\"", "\"w_final\""),
-                                   std::pair("\"rows\":100", "\"rows\":101"),
-                                   std::pair("\"rows\":100", "\"rows\":\"1\""),
-                                   std::pair("\"rows\":100", "\"rows\":0"),
-                                   std::pair("\"check\"", "\"chick\"")}) {
+    for (const auto& [from, to] :
+         {std::pair("\"v_final\"", "\"w_final\""), std::pair("\"rows\":100", "\"rows\":101"),
+          std::pair("\"rows\":100", "\"rows\":\"1\""), std::pair("\"rows\":100", "\"rows\":0"),
+          std::pair("\"check\"", "\"chick\"")}) {
         changed(from, to);
         expect_refused({"ensemble", "--merge", "out"}, {"first line", "was changed"});
         expect_refused(words, {"first line", "was changed"});

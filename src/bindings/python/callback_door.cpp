@@ -264,9 +264,9 @@ private:
     {
         const double t = time.t;
         if (source_.guards_[of.which].rate) {
-            const double known =
-                of.backward ? -closed_rate(of.which, of.mode, t, x, detail::negated(dxdt))
-                            : closed_rate(of.which, of.mode, t, x, dxdt);
+            const double known = of.backward
+                                     ? -closed_rate(of.which, of.mode, t, x, detail::negated(dxdt))
+                                     : closed_rate(of.which, of.mode, t, x, dxdt);
             if (std::isfinite(known)) return known;
         }
         const double delta = 1e-5 * time.scale;
