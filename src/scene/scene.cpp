@@ -35,6 +35,51 @@ double rounding_of(const Vector2& at, double radius)
            (std::fabs(at[0]) + std::fabs(at[1]) + radius);
 }
 
+/// Refuses bodies that overlap at the start. `places`: of the bodies, if not as described.
+void require_apart(const Scene& scene, const std::vector<Vector2>& places)
+{
+    const auto& bodies = scene.bodies();
+    const auto at = [&](std::uint32_t i) { return places.empty() ? bodies[i].at : places[i]; };
+    // Along the axis on which the bodies are spread farther, ordered by the lower edge: a body that
+    // begins before another one ends may overlap it.
+    Vector2 low = bodies.empty() ? Vector2{} : at(0);
+    Vector2 high = low;
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+        for (std::size_t c = 0; c < 2; ++c) {
+            low[c] = std::min(low[c], at(i)[c]);
+            high[c] = std::max(high[c], at(i)[c]);
+        }
+    }
+    const std::size_t along = high[1] - low[1] > high[0] - low[0] ? 1 : 0;
+    std::vector<std::uint32_t> order(bodies.size());
+    for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+    const auto lower = [&](std::uint32_t i) { return at(i)[along] - bodies[i].radius; };
+    if (!std::ranges::is_sorted(order, {}, lower)) std::ranges::sort(order, {}, lower);
+    std::vector<std::uint32_t> open;
+    for (const std::uint32_t i : order) {
+        const Disc& a = bodies[i];
+        std::erase_if(open,
+                      [&](std::uint32_t j) { return at(j)[along] + bodies[j].radius < lower(i); });
+        for (const std::uint32_t j : open) {
+            const Disc& b = bodies[j];
+            const double reach = a.radius + b.radius;
+            const double across = at(i)[1 - along] - at(j)[1 - along];
+            if (reach == 0 || std::fabs(across) > reach) continue;
+            const bool of_systems = !scene.systems().empty() && scene.system_of(i) != nullptr;
+            if (of_systems && scene.system_of(i) == scene.system_of(j)) continue;
+            const double overlap = reach - norm(at(i) - at(j));
+            if (overlap > rounding_of(at(i), a.radius) + rounding_of(at(j), b.radius)) {
+                const auto [first, second] = std::minmax(i, j);
+                throw Misplaced(fmt::format("Scene: {} and {} overlap by {:.3g} at the start",
+                                            scene.name_of(BodyId{first}),
+                                            scene.name_of(BodyId{second}), overlap),
+                                second);
+            }
+        }
+        open.push_back(i);
+    }
+}
+
 }  // namespace
 
 Scene::Scene(const Settings& settings) : settings_(settings)
@@ -320,33 +365,7 @@ void Scene::check(double t_start) const
     }
     const std::vector<Vector2> places =
         systems_.empty() ? std::vector<Vector2>{} : places_at(t_start);
-    const auto at = [&](std::uint32_t i) { return places.empty() ? bodies_[i].at : places[i]; };
-    // Ordered by the left edge: a body that begins before another one ends may overlap it.
-    std::vector<std::uint32_t> order(bodies_.size());
-    for (std::uint32_t i = 0; i < order.size(); ++i) order[i] = i;
-    const auto left = [&](std::uint32_t i) { return at(i)[0] - bodies_[i].radius; };
-    if (!std::ranges::is_sorted(order, {}, left)) std::ranges::sort(order, {}, left);
-    std::vector<std::uint32_t> open;
-    for (const std::uint32_t i : order) {
-        const Disc& a = bodies_[i];
-        std::erase_if(open,
-                      [&](std::uint32_t j) { return at(j)[0] + bodies_[j].radius < left(i); });
-        for (const std::uint32_t j : open) {
-            const Disc& b = bodies_[j];
-            const double reach = a.radius + b.radius;
-            if (reach == 0 || std::fabs(at(i)[1] - at(j)[1]) > reach) continue;
-            if (!systems_.empty() && system_of(i) && system_of(i) == system_of(j)) continue;
-            const double overlap = reach - norm(at(i) - at(j));
-            if (overlap > rounding_of(at(i), a.radius) + rounding_of(at(j), b.radius)) {
-                const auto [first, second] = std::minmax(i, j);
-                throw Misplaced(
-                    fmt::format("Scene: {} and {} overlap by {:.3g} at the start",
-                                name_of(BodyId{first}), name_of(BodyId{second}), overlap),
-                    second);
-            }
-        }
-        open.push_back(i);
-    }
+    require_apart(*this, places);
 }
 
 }  // namespace ricochet

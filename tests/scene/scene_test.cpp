@@ -5,6 +5,8 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
+#include <stdexcept>
 #include <string>
 
 #include "refusal.hpp"
@@ -242,6 +244,38 @@ TEST(Scene, LastingContactOfDiscsEndsTheRunAndNamesThem)
               "lower and upper press on each other: lasting contact is not followed without "
               "SceneOptions::contacts");
     EXPECT_EQ(run.t, 0);
+}
+
+TEST(Scene, OverlapsAreFoundAsByATestOfAllPairs)
+{
+    std::mt19937 random(3);
+    int refused = 0;
+    for (int k = 0; k < 400; ++k) {
+        // Spread along x, along y, or along both.
+        const double width = k % 3 == 0 ? 1 : 60;
+        const double height = k % 3 == 1 ? 1 : 60;
+        Scene scene;
+        bool overlap = false;
+        for (int i = 0; i < 12; ++i) {
+            const auto any = [&](double low, double high) {
+                return std::uniform_real_distribution<double>(low, high)(random);
+            };
+            const Disc disc{.at = {any(0, width), any(0, height)}, .radius = any(0.1, 3)};
+            for (const Disc& other : scene.bodies()) {
+                const double apart = std::hypot(disc.at[0] - other.at[0], disc.at[1] - other.at[1]);
+                overlap = overlap || apart < disc.radius + other.radius;
+            }
+            scene.disc(disc);
+        }
+        if (overlap) {
+            EXPECT_THROW(scene.check(0), std::invalid_argument) << k;
+        } else {
+            EXPECT_NO_THROW(scene.check(0)) << k;
+        }
+        refused += overlap ? 1 : 0;
+    }
+    EXPECT_GT(refused, 100);
+    EXPECT_LT(refused, 390);
 }
 
 }  // namespace
