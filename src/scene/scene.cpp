@@ -354,7 +354,17 @@ void Scene::check(double t_start) const
                                 name_of(SurfaceId{s})));
             }
         }
+        double rounding = 0;
+        for (const Vector2& point : surface.points) {
+            rounding = std::max(rounding, rounding_of(point, 0));
+        }
         for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+            if (bodies_[i].radius > 0 && bodies_[i].radius < rounding) {
+                refuse(fmt::format(
+                    "{} is so far away that its coordinates are rounded by {:.2g} "
+                    "m, more than the radius {:g} m of {}",
+                    name_of(SurfaceId{s}), rounding, bodies_[i].radius, name_of(BodyId{i})));
+            }
             if (!systems_.empty() && system_of(i)) continue;
             try {
                 require_outside(bodies_[i], surface);

@@ -153,6 +153,12 @@ TEST(Scene, WrongValuesAreRefusedInOneSentence)
     scene.disc({.name = "b", .at = {1.5, 5}});
     EXPECT_EQ(refusal([&] { static_cast<void>(simulate(scene, {.t_end = 1})); }),
               "Scene: a and b overlap by 0.5 at the start");
+    Scene far;
+    far.terrain({.name = "plain", .points = {{-1e19, 0}, {1e19, 0}}});
+    far.disc({.name = "a", .at = {0, 3}});
+    EXPECT_EQ(refusal([&] { static_cast<void>(simulate(far, {.t_end = 1})); }),
+              "Scene: \"plain\" is so far away that its coordinates are rounded by 1.8e+04 m, more "
+              "than the radius 1 m of a");
     Scene fine;
     EXPECT_EQ(refusal([&] { static_cast<void>(simulate(fine, {})); }),
               "simulate: t_end must be finite and above t_start 0, got nan");
