@@ -73,6 +73,33 @@ struct Hit {
     Location where;
 };
 
+/// Events of a guard that follow each other in one step and hardly advance: the guard is zero by
+/// rounding at many neighbouring offsets, and its rates contradict that, as with a flow that jumps
+/// there, or near tangency in a long step. The search then continues behind them.
+class Creep {
+public:
+    explicit Creep(double h) noexcept : reach_(0x1p-30 * std::fabs(h)) {}
+
+    /// Whether the event at the offset `root`, after one at `from`, is one too many of them.
+    [[nodiscard]] bool is_too_long(double from, double root) noexcept
+    {
+        count_ = from > 0 && root - from <= reach_ ? count_ + 1 : 0;
+        return count_ > 8;
+    }
+    /// Offset at which the search continues after the event at `root`; further away each time.
+    [[nodiscard]] double behind(double root) noexcept
+    {
+        const double behind = root + reach_;
+        reach_ *= 2;
+        count_ = 0;
+        return behind;
+    }
+
+private:
+    int count_ = 0;
+    double reach_;  ///< [s]
+};
+
 /// The detector and the locator of a run.
 template <class X>
 struct Finders {

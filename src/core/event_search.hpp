@@ -56,6 +56,7 @@ public:
         notes_.clear();
         parts_.clear();
         refined_ = unresolved_ = false;
+        creep_.reset();
     }
 
     /// Work space for a state of the dimension of `like`, for use when no search is continuing.
@@ -153,8 +154,20 @@ public:
     {
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
-        for (const Hit& hit : hits_) {
-            if (hit.guard == i) pass(bank, i, opposite(hit.side), hit.where, probe);
+        const auto hit = std::find_if(hits_.begin(), hits_.end(),
+                                      [i](const Hit& each) { return each.guard == i; });
+        if (hit == hits_.end()) return;
+        const Side side = opposite(hit->side);
+        const double from = bank[i].from;
+        pass(bank, i, side, hit->where, probe);
+        if (!creep_) creep_.emplace(step.h());
+        if (!creep_->is_too_long(from, hit->where.root)) return;
+        const double behind = creep_->behind(hit->where.root);
+        if (behind < step.h()) {
+            pass_behind(bank, i, side, behind, probe);
+        } else {
+            const Side end = side_of(bank.end(i, step.h()).value);
+            bank.go_on_from(i, end, away(end, step.h()));
         }
     }
 
@@ -381,10 +394,16 @@ private:
         return finding;
     }
 
-    [[nodiscard]] Location find(Probe& probe, Finding finding, const Bank& bank, std::size_t i)
+    /// Locates a departure; nothing where the step's own map has none, as `StepProbe::agree_on`.
+    [[nodiscard]] std::optional<Location> find(Probe& probe, Finding finding, const Bank& bank,
+                                               std::size_t i)
     {
-        if (finding.late) return {.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
-        probe.agree_on(finding.lo, finding.hi, bank.start(i));
+        if (finding.late) {
+            return Location{.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
+        }
+        if (!probe.agree_on(finding.lo, finding.hi, bank.start(i), bank[i].side)) {
+            return std::nullopt;
+        }
         const double tolerance = std::max(resolution_.tolerance(probe.step().time(finding.hi.s)),
                                           bank.unresolved(i, probe.step().h()));
         if (!bank[i].info.boolean)
@@ -393,6 +412,17 @@ private:
         Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
         where.jump = false;
         return where;
+    }
+
+    /// Continues behind a departure that the step's own map does not have, on the map's side.
+    [[gnu::noinline]] static void go_behind(Probe& probe, const Finding& finding, Bank& bank,
+                                            std::size_t i)
+    {
+        GuardSample start = probe.value_and_rate(finding.hi.s);
+        const Side side =
+            has_left(finding.side, start.value) ? opposite(finding.side) : finding.side;
+        if (start.value == 0) start.value = away(side, start.s).value;
+        bank.go_on_from(i, side, start);
     }
 
     [[gnu::noinline]] void touched(Bank& bank, std::size_t i, Side side, double s)
@@ -423,6 +453,18 @@ private:
         bank[i].slope = where.slope;
     }
 
+    /// Continues the search at the offset `behind` an event, on the side of the guard there.
+    void pass_behind(Bank& bank, std::size_t i, Side side, double behind, Probe& probe)
+    {
+        const Side there = side_of(probe.value(behind).value);
+        pass(bank, i, there == Side::plateau ? side : there,
+             {.lo = behind,
+              .hi = behind,
+              .root = behind,
+              .slope = std::numeric_limits<double>::quiet_NaN()},
+             probe);
+    }
+
     /// Adds a hit of an acting guard, and its touches before it.
     void examine(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
@@ -433,6 +475,14 @@ private:
             const Finding finding = next_finding(probe, watch, bank, i);
             if (finding.touch) continue;
             if (!finding.hit) return;
+            if (bank[i].from > 0 && !finding.late) {
+                probe.watch(finding.side);
+                GuardSample lo = finding.lo;
+                if (!probe.agree_on(lo, finding.hi, bank.start(i), bank[i].side)) {
+                    go_behind(probe, finding, bank, i);
+                    continue;
+                }
+            }
             late_ = late_ || finding.late;
             Hit hit;
             hit.guard = i;
@@ -461,7 +511,7 @@ private:
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
         probe.watch(hit.side);
-        hit.where = find(probe, hit.finding, bank, hit.guard);
+        hit.where = find(probe, hit.finding, bank, hit.guard).value();
         hit.located = true;
     }
 
@@ -504,8 +554,12 @@ private:
             if (!finding.hit) return false;
             late_ = finding.late;
             probe.watch(finding.side);
-            const Location where = find(probe, finding, bank, i);
-            keep_only(i, finding.side, where, finding.late ? step.x0() : probe.state_at(where));
+            const std::optional<Location> where = find(probe, finding, bank, i);
+            if (!where) {
+                go_behind(probe, finding, bank, i);
+                continue;
+            }
+            keep_only(i, finding.side, *where, finding.late ? step.x0() : probe.state_at(*where));
             return true;
         }
         return false;
@@ -552,6 +606,7 @@ private:
     bool late_ = false;
     double at_ = 0;
     double at_remainder_ = 0;
+    std::optional<Creep> creep_;  ///< of the acting guards
 };
 
 }  // namespace ricochet::detail

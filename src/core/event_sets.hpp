@@ -28,7 +28,7 @@ inline void EventSearch<X, single>::locate_alone(const CurrentStep& step, Bank& 
     const auto guard = bank.view(hit.guard, step.mode(), calls);
     Probe probe(guard, step, space_);
     probe.watch(hit.side);
-    hit.where = find(probe, hit.finding, bank, hit.guard);
+    hit.where = find(probe, hit.finding, bank, hit.guard).value();
     at_ = hit.where.root;
     at_remainder_ = hit.where.root_remainder;
     assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));

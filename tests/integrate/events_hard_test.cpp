@@ -924,6 +924,53 @@ TEST(HardEvents, ARootNextToTheEndOfAStepIsResetOnce)
     EXPECT_EQ(runs, 240);
 }
 
+/// An oscillator with a reset that changes nothing, or whose events are rejected. The guard throws
+/// where a run evaluates it without end.
+struct Unmoved {
+    using State = X;
+    bool rejects = false;
+    mutable int calls = 0;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -x[0]}; }
+    template <class View>
+    [[nodiscard]] double guard(double, const View& x) const
+    {
+        if (++calls > 20'000) throw std::runtime_error("too many calls of the guard");
+        return x[0] - 0.3;
+    }
+    [[nodiscard]] GuardInfo guard_info() const { return {.crossing = Crossing::either}; }
+    [[nodiscard]] bool enabled(double, const X&) const { return !rejects; }
+    void reset(double, X&) const {}
+};
+
+/// The guard crosses its surface at most twice in a turn, and once where it ends on the other side.
+template <class Stepping>
+void expect_single_crossings(const Options& options)
+{
+    for (const bool rejects : {false, true}) {
+        for (int k = 0; k < 100; ++k) {
+            const double angle = 0.0628 * k;
+            const Unmoved system{.rejects = rejects};
+            const X start{std::cos(angle), std::sin(angle)};
+            const auto run = integrate(system, start, options, Stepping{});
+            const auto crossings = rejects ? run.statistics.disabled : run.events.size();
+            EXPECT_LE(crossings, 2U) << k;
+            EXPECT_EQ(crossings % 2 == 1, (start[0] > 0.3) != (run.x[0] > 0.3)) << k;
+        }
+    }
+}
+
+TEST(HardEvents, AnEventThatChangesNothingIsFoundOnceWhereTheStepDiffersFromItsPolynomial)
+{
+    // The event is located on the method's own step. Its polynomial, on which the rest of the step
+    // is examined, crosses the surface later.
+    expect_single_crossings<FixedStep<Euler>>({.t_end = 6.2, .step = 0.2});
+    expect_single_crossings<FixedStep<Euler>>({.t_end = 6.2, .step = 0.05});
+    expect_single_crossings<FixedStep<Rk4>>({.t_end = 6.2, .step = 0.9});
+    expect_single_crossings<ErrorControlled<Dopri5>>({.t_end = 6.2, .rtol = 1e-2, .atol = 1e-2});
+    expect_single_crossings<ErrorControlled<CashKarp54>>(
+        {.t_end = 6.2, .rtol = 1e-2, .atol = 1e-2});
+}
+
 /// A clock beside a motion that makes its steps irregular.
 struct Alarm {
     using State = X1;

@@ -280,15 +280,28 @@ public:
     /// Makes the bracket from detection, which used the polynomial, consistent with the step's own
     /// map. If the map disagrees with the polynomial about the near end, the bracket starts where
     /// the interval does; if it disagrees about the far end, which can happen near tangency, the
-    /// polynomial is used from here on.
-    void agree_on(GuardSample& lo, const GuardSample& hi, const GuardSample& start)
+    /// polynomial is used from here on. False: the interval starts at an event on the map, which
+    /// the polynomial meets later, and the departure is that event once more.
+    /// @param armed  side on which the guard is at the start of the interval
+    [[nodiscard]] bool agree_on(GuardSample& lo, const GuardSample& hi, const GuardSample& start,
+                                Side armed)
     {
-        if (path_ == Path::dense) return;
+        if (path_ == Path::dense) return true;
+        const auto lags = [&] {
+            return start.s > 0 && ricochet::has_left(armed, dense_value(start.s).value);
+        };
         if (hi.s != step_->h() && !has_left(value(hi.s))) {
+            if (lo.s == start.s && lags()) return false;
             path_ = Path::dense;
         } else if (lo.s != start.s && has_left(value(lo.s))) {
-            lo = start;
+            if (side_ == armed) {
+                lo = start;
+            } else {
+                if (lags()) return false;
+                path_ = Path::dense;
+            }
         }
+        return true;
     }
 
     [[nodiscard]] int degree() const override
