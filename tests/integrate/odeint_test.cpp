@@ -12,8 +12,11 @@
 #include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
 #include <cmath>
 #include <random>
+#include <string>
 #include <vector>
 
+#include "refusal.hpp"
+#include "ricochet/integrate/integrate.hpp"
 #include "step_of.hpp"
 #include "walled_oscillator.hpp"
 
@@ -151,6 +154,34 @@ TEST(Odeint, AUsersOwnStepperNeedsOnlyTheStepInPlace)
     EXPECT_EQ(step.order(), 2);
     EXPECT_NEAR(step.x1()[0], 1 - 0.01 * 0.01 / 2, 1e-16);
     EXPECT_NEAR(step.x1()[1], -0.01, 1e-18);
+}
+
+/// A state of run-time size that cannot be resized.
+struct Unresizable {
+    std::vector<double> components;
+    [[nodiscard]] double& operator[](std::size_t i) { return components[i]; }
+    [[nodiscard]] double operator[](std::size_t i) const { return components[i]; }
+    [[nodiscard]] std::size_t size() const { return components.size(); }
+};
+
+struct Rotation {
+    void flow(double, const Unresizable& x, Unresizable& dxdt) const
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -x[0];
+    }
+};
+
+TEST(Odeint, AStateThatItsSteppersCannotMakeIsRefused)
+{
+    const auto refused = refusal([] {
+        (void)integrate(Rotation{}, Unresizable{{1, 0}}, {.t_end = 1, .step = 0.1},
+                        FixedStep<Odeint<odeint::runge_kutta4_classic>>{});
+    });
+    EXPECT_NE(refused.find("resize"), std::string::npos) << refused;
+    // The library's own methods need no state but the start.
+    const auto run = integrate(Rotation{}, Unresizable{{1, 0}}, {.t_end = 1});
+    EXPECT_NEAR(run.x[0], std::cos(1), 1e-7);
 }
 
 }  // namespace
