@@ -52,6 +52,7 @@ struct Note {
     EventKind kind;
     Side side;  ///< the side that the guard left
     Location where;
+    bool on_map = false;  ///< located on the step's own map, not on its polynomial
 };
 
 /// Drops the recorded crossings beyond the offset s, and sorts the others by time.

@@ -51,4 +51,27 @@ inline void EventSearch<X, single>::note_crossings(const CurrentStep& step, Bank
     }
 }
 
+template <class X, bool single>
+inline void EventSearch<X, single>::pass(const CurrentStep& step, Bank& bank, std::size_t i,
+                                         std::uint64_t& calls)
+{
+    const auto guard = bank.view(i, step.mode(), calls);
+    Probe probe(guard, step, space_);
+    const auto hit =
+        std::find_if(hits_.begin(), hits_.end(), [i](const Hit& each) { return each.guard == i; });
+    if (hit == hits_.end()) return;
+    const Side side = opposite(hit->side);
+    const double from = bank[i].from;
+    pass(bank, i, side, hit->where, probe);
+    if (!creep_) creep_.emplace(step.h());
+    if (!creep_->is_too_long(from, hit->where.root)) return;
+    const double behind = creep_->behind(hit->where.root);
+    if (behind < step.h()) {
+        pass_behind(bank, i, side, behind, probe);
+    } else {
+        const Side end = side_of(bank.end(i, step.h()).value);
+        bank.go_on_from(i, end, away(end, step.h()));
+    }
+}
+
 }  // namespace ricochet::detail

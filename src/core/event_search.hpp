@@ -146,30 +146,15 @@ public:
     /// Adds a located crossing of an acting guard that did not change anything.
     void note(std::size_t i, Side side)
     {
-        notes_.push_back({.guard = i, .kind = kind_of(where(i)), .side = side, .where = where(i)});
+        notes_.push_back({.guard = i,
+                          .kind = kind_of(where(i)),
+                          .side = side,
+                          .where = where(i),
+                          .on_map = true});
     }
 
     /// Continues the search after a crossing that changes nothing.
-    void pass(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
-    {
-        const auto guard = bank.view(i, step.mode(), calls);
-        Probe probe(guard, step, space_);
-        const auto hit = std::find_if(hits_.begin(), hits_.end(),
-                                      [i](const Hit& each) { return each.guard == i; });
-        if (hit == hits_.end()) return;
-        const Side side = opposite(hit->side);
-        const double from = bank[i].from;
-        pass(bank, i, side, hit->where, probe);
-        if (!creep_) creep_.emplace(step.h());
-        if (!creep_->is_too_long(from, hit->where.root)) return;
-        const double behind = creep_->behind(hit->where.root);
-        if (behind < step.h()) {
-            pass_behind(bank, i, side, behind, probe);
-        } else {
-            const Side end = side_of(bank.end(i, step.h()).value);
-            bank.go_on_from(i, end, away(end, step.h()));
-        }
-    }
+    void pass(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls);
 
     /// A guard that leaves its plateau in the step on the side away from the awaited one is
     /// armed on the awaited side from there on.
@@ -232,10 +217,11 @@ public:
         if (!notes_.empty()) sort_notes_until(s, notes_);
     }
 
-    /// State at a crossing on the step's polynomial.
+    /// State at a crossing, on the map of the step on which it was located.
     [[nodiscard]] const X& state_at(const CurrentStep& step, const Note& note)
     {
-        step.interpolate(note.where.root, space_.x);
+        const double s = note.where.root;
+        note.on_map ? step.restep(s, space_.x) : step.interpolate(s, space_.x);
         return space_.x;
     }
 

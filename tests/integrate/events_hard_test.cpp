@@ -955,14 +955,19 @@ void expect_single_crossings(const Options& options)
             const auto crossings = rejects ? run.statistics.disabled : run.events.size();
             EXPECT_LE(crossings, 2U) << k;
             EXPECT_EQ(crossings % 2 == 1, (start[0] > 0.3) != (run.x[0] > 0.3)) << k;
+            for (const auto& event : run.events) {
+                // The offset in the step and the state there are rounded by 1e-16 each.
+                EXPECT_NEAR(event.before[0], 0.3, 1e-15) << k;
+                EXPECT_EQ(event.before, event.after);
+            }
         }
     }
 }
 
 TEST(HardEvents, AnEventThatChangesNothingIsFoundOnceWhereTheStepDiffersFromItsPolynomial)
 {
-    // The event is located on the method's own step. Its polynomial, on which the rest of the step
-    // is examined, crosses the surface later.
+    // The event is located on the method's own step, which has its state. The polynomial, on which
+    // the rest of the step is examined, crosses the surface later.
     expect_single_crossings<FixedStep<Euler>>({.t_end = 6.2, .step = 0.2});
     expect_single_crossings<FixedStep<Euler>>({.t_end = 6.2, .step = 0.05});
     expect_single_crossings<FixedStep<Rk4>>({.t_end = 6.2, .step = 0.9});
