@@ -52,7 +52,7 @@ struct Note {
     EventKind kind;
     Side side;  ///< the side that the guard left
     Location where;
-    bool on_map = false;  ///< located on the step's own map, not on its polynomial
+    std::size_t state = std::numeric_limits<std::size_t>::max();  ///< index of its state, if kept
 };
 
 /// Drops the recorded crossings beyond the offset s, and sorts the others by time.

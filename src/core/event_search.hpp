@@ -54,6 +54,7 @@ public:
     {
         fit(like);
         notes_.clear();
+        states_.clear();
         parts_.clear();
         refined_ = unresolved_ = false;
         creep_.reset();
@@ -143,14 +144,14 @@ public:
     void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
                         std::uint64_t& calls);
 
-    /// Adds a located crossing of an acting guard that did not change anything.
-    void note(std::size_t i, Side side)
+    /// Adds a located crossing of an acting guard that did not change anything; `keeps_state` if
+    /// its state will be recorded.
+    void note(std::size_t i, Side side, bool keeps_state)
     {
-        notes_.push_back({.guard = i,
-                          .kind = kind_of(where(i)),
-                          .side = side,
-                          .where = where(i),
-                          .on_map = true});
+        notes_.push_back({.guard = i, .kind = kind_of(where(i)), .side = side, .where = where(i)});
+        if (!keeps_state) return;
+        notes_.back().state = states_.size();
+        states_.push_back(before_);
     }
 
     /// Continues the search after a crossing that changes nothing.
@@ -217,11 +218,11 @@ public:
         if (!notes_.empty()) sort_notes_until(s, notes_);
     }
 
-    /// State at a crossing, on the map of the step on which it was located.
+    /// State at a crossing: that of its location, or on the step's polynomial.
     [[nodiscard]] const X& state_at(const CurrentStep& step, const Note& note)
     {
-        const double s = note.where.root;
-        note.on_map ? step.restep(s, space_.x) : step.interpolate(s, space_.x);
+        if (note.state < states_.size()) return states_[note.state];
+        step.interpolate(note.where.root, space_.x);
         return space_.x;
     }
 
@@ -584,6 +585,7 @@ private:
     GuardList<Hit, single> hits_;
     GuardList<std::size_t, single> fired_;
     std::vector<Note> notes_;
+    std::vector<X> states_;  ///< of notes
     EventResolution resolution_;
     ResolvedParts parts_;
     bool refined_ = false;

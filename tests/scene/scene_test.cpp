@@ -157,7 +157,7 @@ TEST(Scene, WrongValuesAreRefusedInOneSentence)
     far.terrain({.name = "plain", .points = {{-1e19, 0}, {1e19, 0}}});
     far.disc({.name = "a", .at = {0, 3}});
     EXPECT_EQ(refusal([&] { static_cast<void>(simulate(far, {.t_end = 1})); }),
-              "Scene: \"plain\" is so far away that its coordinates are rounded by 1.8e+04 m, more "
+              "Scene: plain is so far away that its coordinates are rounded by 1.8e+04 m, more "
               "than the radius 1 m of a");
     Scene fine;
     EXPECT_EQ(refusal([&] { static_cast<void>(simulate(fine, {})); }),

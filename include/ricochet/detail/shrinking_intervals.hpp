@@ -48,16 +48,16 @@ public:
         return false;
     }
 
-    /// Begins anew after the motion has come to rest. Events that do not advance the time are
+    /// Starts again after the motion has come to rest. Events that do not advance the time are
     /// counted on: a rest need not end them.
     void come_to_rest() noexcept
     {
-        ShrinkingIntervals anew;
+        ShrinkingIntervals fresh;
         if (stalled_ > most_at_once) {
-            anew.last_ = last_;
-            anew.stalled_ = stalled_;
+            fresh.last_ = last_;
+            fresh.stalled_ = stalled_;
         }
-        *this = anew;
+        *this = fresh;
     }
 
     /// Whether the time has not advanced although the motion has come to rest a hundred times.
