@@ -229,6 +229,12 @@ protected:
     /// Whether this event of the guard, not yet counted, ends the run.
     [[nodiscard]] bool ends_run(std::size_t i) const noexcept;
 
+    /// Whether events are recorded with their states.
+    [[nodiscard]] bool records_states() const noexcept
+    {
+        return options_.record_events && (options_.event_states || system_->fixed_dimension);
+    }
+
     void go_on_past_members();
 
     // --- deferred checks ---

@@ -176,10 +176,8 @@ inline bool EventEngine<X, single>::ends_run(std::size_t i) const noexcept
 template <class X, bool single>
 inline void EventEngine<X, single>::go_on_past_members()
 {
-    const bool keeps_state =
-        options_.record_events && (options_.event_states || system_->fixed_dimension);
     for (const std::size_t i : search_.fired()) {
-        search_.note(i, bank_[i].side, keeps_state);
+        search_.note(i, bank_[i].side, records_states());
         search_.pass(step_, bank_, i, calls());
     }
 }

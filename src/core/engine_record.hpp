@@ -168,7 +168,7 @@ inline void EventEngine<X, single>::record_notes(double s)
                        .bracket = {step_.time(note.where.lo), step_.time(note.where.hi)},
                        .slope = note.where.slope,
                        .error = note.where.error};
-        if (options_.event_states || system_->fixed_dimension) {
+        if (records_states()) {
             event.before = search_.state_at(step_, note);
             event.after = event.before;
         }
