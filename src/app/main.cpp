@@ -1,5 +1,5 @@
-// The command line `ricochet`: `systems`, `simulate`, `ensemble`, `inspect` and `compare`, which
-// need only the core. Further programs beside it, `ricochet-<name>`, execute all other
+// The command line `ricochet`: `systems`, `simulate`, `inspect` and `compare`, which need only the
+// core. Further programs beside it, `ricochet-<name>`, execute all other
 // commands.
 #include <fmt/format.h>
 #include <unistd.h>
@@ -49,13 +49,6 @@ int simulate_here_or_there(const SimulateRequest& request)
                                   : run_instead(system.program, all_arguments + 1);
 }
 
-int ensemble_here_or_there(const EnsembleRequest& request)
-{
-    const bool there = !request.merge && !request.system.empty() &&
-                       find_system(request.system).program == nonsmooth;
-    return there ? run_instead(nonsmooth, all_arguments + 1) : run_ensemble(request);
-}
-
 int compare_here_or_there(const CompareRequest& request)
 {
     for (const std::string_view study : {"fault", "rate-and-state", "step-control"}) {
@@ -71,18 +64,19 @@ struct Program {
     std::string_view name;
     std::string_view meaning;
 };
-constexpr std::array<Program, 2> programs{
-    {{"train", "Train a network that predicts events, or one that chooses steps"},
+constexpr std::array<Program, 3> programs{
+    {{"ensemble", "Run a system for every row of a table, on all cores"},
+     {"train", "Train a network that predicts events, or one that chooses steps"},
      {"certify", "Prove that where a model clears, its guard is above a margin"}}};
 
 void add_commands(CLI::App& app, int& status)
 {
     add_systems(app, status, list_systems);
     add_simulate(app, status, simulate_here_or_there);
-    add_ensemble(app, status, ensemble_here_or_there);
     add_program(app, programs[0].name, programs[0].meaning);
-    add_inspect(app, status, inspect);
     add_program(app, programs[1].name, programs[1].meaning);
+    add_inspect(app, status, inspect);
+    add_program(app, programs[2].name, programs[2].meaning);
     add_compare(app, status, compare_here_or_there);
     add_program(app, "explain", "Say how a scene would be run: ricochet explain SCENE.json");
 }

@@ -165,9 +165,6 @@ void add_program(CLI::App& app, std::string_view name, std::string_view meaning)
     app.add_subcommand(std::string(name), std::string(meaning));
 }
 
-namespace {
-
-/// The options that `simulate` and `ensemble` share.
 void add_run_options(CLI::App& command, RunRequest& run)
 {
     command.add_option("--set", run.set, "a parameter of the system; may be repeated")
@@ -207,8 +204,6 @@ void add_run_options(CLI::App& command, RunRequest& run)
                      "end the run after N steps, as step_limit; default 10 million");
 }
 
-}  // namespace
-
 void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
 {
     CLI::App& command = *app.add_subcommand("simulate", "Run a system and print its events");
@@ -237,41 +232,6 @@ void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
         "  assumed   the guard was evaluated at the ends only (ends), or a network predicted no "
         "event\n"
         "A late event was found at a step after the one that held it.");
-    command.callback([&status, request, handler] { status = handler(*request); });
-}
-
-void add_ensemble(CLI::App& app, int& status, EnsembleHandler handler)
-{
-    CLI::App& command =
-        *app.add_subcommand("ensemble", "Run a system for every row of a table, on all cores");
-    auto request = std::make_shared<EnsembleRequest>();
-    command.add_option("SYSTEM", request->system, "its name; `ricochet systems` lists them")
-        ->type_name("");
-    add_text(command, "--table", request->table, "FILE",
-             "comma-separated values; columns are parameters and components of the start");
-    add_whole_number(command, "--count", request->count, 1, 1'000'000'000,
-                     "random rows in place of a table");
-    command
-        .add_option("--vary", request->vary, "an interval that --count draws from; may be repeated")
-        ->type_name("name=lowest:highest ...");
-    add_whole_number(command, "--seed", request->seed, 0, std::numeric_limits<std::uint64_t>::max(),
-                     "of random rows, default 1");
-    add_text(command, "--out", request->out, "DIR", "where the results are kept; made if needed");
-    add_text(command, "--share", request->share, "K/N",
-             "run share K of N only; default: by the ranks of Open MPI, PMI or Slurm, or all");
-    add_text(command, "--merge", request->merge, "DIR", "join the shares there, and run nothing");
-    add_whole_number(command, "--threads", request->threads, 1, 1024,
-                     "default: one for each core that may be used");
-    command.add_flag("--json", request->json, "print JSON");
-    add_run_options(command, request->run);
-    command.footer(
-        "Examples:\n"
-        "  ricochet ensemble bouncing-ball --count 1000 --vary height=1:10 --out balls\n"
-        "  ricochet ensemble bouncing-ball --table balls.csv --out balls --t-end 20\n"
-        "  mpirun -n 4 ricochet ensemble bouncing-ball --table balls.csv --out balls\n"
-        "  ricochet ensemble --merge balls\n\n"
-        "A call that was ended early is repeated as it was, and goes on where it ended. The\n"
-        "results, results.npy and results.csv in DIR, are the same for any shares and threads.");
     command.callback([&status, request, handler] { status = handler(*request); });
 }
 

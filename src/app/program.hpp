@@ -10,7 +10,6 @@
 #include <string_view>
 
 #include "compare.hpp"
-#include "ensemble/ensemble_command.hpp"
 #include "inspect.hpp"
 #include "simulate.hpp"
 #include "systems.hpp"
@@ -28,15 +27,16 @@ using SystemsHandler = int (*)(ListFormat format);
 using InspectHandler = int (*)(const InspectRequest& request);
 using SimulateHandler = int (*)(const SimulateRequest& request);
 using CompareHandler = int (*)(const CompareRequest& request);
-using EnsembleHandler = int (*)(const EnsembleRequest& request);
 
 void add_systems(CLI::App& app, int& status, SystemsHandler handler);
 void add_inspect(CLI::App& app, int& status, InspectHandler handler);
 
-/// `simulate`, `ensemble` and `compare` with all their options, for several programs.
+/// `simulate` and `compare` with all their options, for several programs.
 void add_simulate(CLI::App& app, int& status, SimulateHandler handler);
-void add_ensemble(CLI::App& app, int& status, EnsembleHandler handler);
 void add_compare(CLI::App& app, int& status, CompareHandler handler);
+
+/// The options of a run, which `simulate` and `ensemble` share.
+void add_run_options(CLI::App& command, RunRequest& run);
 
 /// A command that is a program of its own, for the list of commands.
 void add_program(CLI::App& app, std::string_view name, std::string_view meaning);

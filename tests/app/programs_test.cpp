@@ -24,6 +24,8 @@ TEST_F(App, FurtherProgramsRunByThemselves)
     EXPECT_EQ(status_of("ricochet-nonsmooth", "simulate sliding-mode --json"), 0);
     EXPECT_EQ(status_of("ricochet-nonsmooth", "simulate bouncing-ball"), 2);
     EXPECT_EQ(status_of("ricochet-nonsmooth", "compare bouncing-ball"), 2);
+    EXPECT_EQ(status_of("ricochet-ensemble", "--help"), 0);
+    EXPECT_EQ(status_of("ricochet-ensemble", "bouncing-ball"), 2);
     EXPECT_EQ(status_of("ricochet-train", "--help"), 0);
     EXPECT_EQ(status_of("ricochet-train", "pendulums --out x.safetensors"), 2);
     EXPECT_EQ(status_of("ricochet-certify", "--help"), 0);
@@ -35,8 +37,9 @@ TEST_F(App, AProgramThatIsNotThereIsNamed)
     const fs::path alone = work() / "ricochet";
     fs::copy_file(RICOCHET_APP, alone);
     for (const char* const words :
-         {"train bouncing-ball --out x", "certify x", "simulate fault", "simulate spring-slider",
-          "simulate stick-slip", "compare sliding-mode", "compare step-control"}) {
+         {"ensemble bouncing-ball", "train bouncing-ball --out x", "certify x", "simulate fault",
+          "simulate spring-slider", "simulate stick-slip", "compare sliding-mode",
+          "compare step-control"}) {
         const std::string command = "'" + alone.string() + "' " + words + " >/dev/null 2>'" +
                                     (work() / "err").string() + "'";
         const int status = std::system(command.c_str());

@@ -12,6 +12,10 @@
 #include "../settings.hpp"
 #include "share.hpp"
 
+namespace CLI {
+class App;
+}
+
 namespace ricochet::app {
 
 struct EnsembleRequest {
@@ -40,6 +44,11 @@ struct EnsembleRequest {
 ///         143 if a signal ended it
 /// @throws BadInput, ModelError, WriteError
 int run_ensemble(const EnsembleRequest& request);
+
+using EnsembleHandler = int (*)(const EnsembleRequest& request);
+
+/// Adds the command with all its options; it sets the exit status when it is run.
+void add_ensemble(CLI::App& app, int& status, EnsembleHandler handler);
 
 /// Processes that share the blocks as they become free, in place of fixed shares.
 struct BlockDealer {

@@ -10,6 +10,7 @@
 #include "../input.hpp"
 #include "../program.hpp"
 #include "../registry.hpp"
+#include "ensemble_command.hpp"
 
 namespace ricochet::app {
 

@@ -1,5 +1,4 @@
-// `ricochet-nonsmooth`: `simulate`, `ensemble` and `compare` of differential inclusions and
-// contacts.
+// `ricochet-nonsmooth`: `simulate` and `compare` of differential inclusions and contacts.
 #include <fmt/format.h>
 
 #include "../input.hpp"
@@ -30,12 +29,6 @@ int simulate_one(const SimulateRequest& request)
     return simulate(request);
 }
 
-int ensemble_of_one(const EnsembleRequest& request)
-{
-    if (!request.merge) (void)own_system(request.system);
-    return run_ensemble(request);
-}
-
 int compare_one(const CompareRequest& request)
 {
     const SystemEntry& system = own_system(request.system);
@@ -53,7 +46,6 @@ int main(int count, char** arguments)
     return run_program(
         [](CLI::App& app, int& status) {
             add_simulate(app, status, simulate_one);
-            add_ensemble(app, status, ensemble_of_one);
             add_compare(app, status, compare_one);
         },
         count, arguments);
