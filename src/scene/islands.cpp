@@ -154,13 +154,14 @@ void Islands::depart_few(const Island& island, double h, bool with_error, const 
     } else {
         Method::template depart<false>(departure, x, h, stages.data(), {w, end_rate, error});
     }
+    seen_ = nullptr;
     std::ranges::copy(w, w_.begin());
+    if (!with_error) return;  // a place in the current step, which has its record already
     std::ranges::copy(end_rate, end_rate_.begin());
     std::ranges::copy(error, error_.begin());
     for (std::size_t k = 0; k < stages.size() && !island.unseen; ++k) {
         std::ranges::copy(stages[k], stages_[k].begin());
     }
-    seen_ = nullptr;
 }
 
 void Islands::depart(const Island& island, double h, bool with_error) const

@@ -153,6 +153,13 @@ private:
     void apply(bool struck);
     std::uint32_t begin_record(std::uint32_t i, const Vector2& velocity,
                                const std::vector<Side>& sides);
+    struct Strike {
+        Vector2 arrives, leaves, impulse;
+    };
+    [[nodiscard]] std::optional<Strike> strike_on_wall(const Body& body, const Vector2& arrives,
+                                                       const Instant& t) const;
+    void record(std::uint32_t i, const Strike& strike);
+    bool strikes_alone(std::uint32_t i);
     [[nodiscard]] bool flies_above_one_wall(const Body& body) const;
     bool bounces_from_start();
     [[nodiscard]] bool flies_past_end(std::uint32_t i) const;
@@ -160,6 +167,7 @@ private:
     bool collapses(std::uint32_t slot);
     bool hops_below_rounding(std::uint32_t slot);
     void restart_island(std::uint32_t island);
+    void continue_island(std::uint32_t island);
     bool let_events_happen();
     void schedule(std::uint32_t island);
     bool push_system(std::uint32_t island);
@@ -199,6 +207,9 @@ private:
     std::vector<std::uint32_t> slots_of_islands_;
     std::vector<std::uint32_t> groups_struck_;
     std::vector<std::pair<std::uint32_t, Vector2>> velocities_;
+    /// After this many impacts of a body at mean intervals within the resolution of time, its
+    /// cluster collapses.
+    static constexpr std::uint32_t crowded = 64;
     struct Series {
         Instant since{};
         Instant last{-never, 0};

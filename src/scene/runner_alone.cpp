@@ -1,4 +1,5 @@
-// A disc alone above the only wall, whose flights and impacts have closed forms.
+// A disc alone above the only wall: its impacts have a closed form, and without drag its flights,
+// too.
 #include <algorithm>
 
 #include "scene/runner.hpp"
@@ -36,33 +37,76 @@ bool Runner::bounces_from_start()
 
     const double s = seconds(body.t, t);
     const Vector2 arrives = speed(body, s);
-    const double approach = -dot(arrives, wall.normal);
-    const double restitution = world_.restitution(body.material, wall.material);
-    const double impulse = (1 + restitution) * approach * (1 / body.inverse_mass);
-    const Vector2 leaves = arrives + body.inverse_mass * (impulse * wall.normal);
-    // Slower bodies may stay on the wall.
-    const double least = std::max(resolution(t) * norm(world_.gravity), noise(leaves, {}));
-    if (!(approach > noise(arrives, {}) && dot(leaves, wall.normal) > least)) return false;
-    if (!is_finite(leaves)) return false;
+    const auto strike = strike_on_wall(body, arrives, t);
+    if (!strike) return false;
 
     now_ = t;
     body.p = place(body, s);
-    body.v = leaves;
+    body.v = strike->leaves;
     body.t = t;
     ++body.version;
     series_[i] = {.since = t, .last = t, .count = 1};
     ++world_.statistics.predictions;
+    record(i, *strike);
+    bounce(i);
+    return true;
+}
+
+/// The impact of a body alone on the only wall, with the arithmetic of `Impacts` but without
+/// friction. Nothing where the body may stay on the wall.
+std::optional<Runner::Strike> Runner::strike_on_wall(const Body& body, const Vector2& arrives,
+                                                     const Instant& t) const
+{
+    const Face& wall = world_.faces[0];
+    const double approach = -dot(arrives, wall.normal);
+    const double restitution = world_.restitution(body.material, wall.material);
+    Strike strike{.arrives = arrives, .leaves = {}, .impulse = {}};
+    const double size = (1 + restitution) * approach * (1 / body.inverse_mass);
+    strike.impulse = size * wall.normal;
+    strike.leaves = arrives + body.inverse_mass * strike.impulse;
+    const double least = std::max(resolution(t) * norm(world_.gravity), noise(strike.leaves, {}));
+    if (!(approach > noise(arrives, {}) && dot(strike.leaves, wall.normal) > least)) return {};
+    if (!is_finite(strike.leaves)) return {};
+    return strike;
+}
+
+/// Counts and records an impact on the only wall at the present time.
+void Runner::record(std::uint32_t i, const Strike& strike)
+{
     ++world_.statistics.waves;
     ++world_.statistics.impacts;
-    if (options.record_events) {
-        SceneEvent event{.t = t.value, .body = i, .impulse = impulse * wall.normal};
-        event.other = {true, wall.surface};
-        event.before[0] = arrives;
-        event.after[0] = leaves;
+    if (world_.options.record_events) {
+        SceneEvent event{
+            .t = now_.value, .number = result_.event_count, .body = i, .impulse = strike.impulse};
+        event.other = {true, world_.faces[0].surface};
+        event.before[0] = strike.arrives;
+        event.after[0] = strike.leaves;
         result_.events.push_back(event);
     }
     ++result_.event_count;
-    bounce(i);
+}
+
+/// Takes a body with drag, alone with the only wall, through an impact without friction. Returns
+/// false, with nothing changed, where anything else may happen.
+bool Runner::strikes_alone(std::uint32_t i)
+{
+    const Body& body = world_.bodies[i];
+    if (members_.size() != 1 || world_.faces.size() != 1 || world_.wall_count != 1) return false;
+    if (body.island == none || body.mapped || body.contact != none || body.radius == 0)
+        return false;
+    if (world_.options.elastic_within > 0 || series_[i].count >= crowded) return false;
+    if (world_.friction(body.material, world_.faces[0].material) > 0) return false;
+    const auto strike = strike_on_wall(body, world_.velocity(i, now_), now_);
+    if (!strike) return false;
+    Series& series = series_[i];
+    if (series.count++ == 0) series.since = now_;
+    series.last = now_;
+    series.low = 0;
+    unmoved_ = 0;
+    record(i, *strike);
+    velocities_.assign(1, {i, strike->leaves});
+    continue_island(body.island);
+    if (!result_.failure) predict(i);
     return true;
 }
 

@@ -12,10 +12,6 @@ namespace ricochet::detail {
 
 namespace {
 
-/// After this many impacts of a body at mean intervals within the resolution of time, its cluster
-/// collapses.
-constexpr std::uint32_t crowded = 64;
-
 /// Hops are low below this many roundings of the place; this many consecutive low hops are the
 /// last.
 constexpr double low = 1024;
@@ -309,6 +305,7 @@ bool Runner::let_events_happen()
 
 void Runner::impact(std::uint32_t i)
 {
+    if (strikes_alone(i)) return;
     gather(i, pending_[i]);
     if (let_events_happen()) return predict(i);
     resolve_cluster(i);
@@ -484,6 +481,12 @@ void Runner::restart_island(std::uint32_t island)
             velocities_.emplace_back(i, cluster_.after[k]);
         }
     }
+    continue_island(island);
+}
+
+/// Continues an island from the present time with the changed `velocities_`.
+void Runner::continue_island(std::uint32_t island)
+{
     Islands& islands = *world_.islands;
     const bool taken = islands.restart(island, now_, velocities_);
     if (!taken) {

@@ -237,6 +237,60 @@ TEST(Discs, ABallAloneBouncesFromTheStartAsAfterASearch)
     EXPECT_GT(impacts, 10'000u);
 }
 
+TEST(Discs, ABallWithDragBouncesAloneAsBelowAFarCeiling)
+{
+    // Alone above the only wall, impacts are resolved without a search for contacts.
+    std::mt19937_64 random(11);
+    const auto any = [&](double from, double to) {
+        return std::uniform_real_distribution<>(from, to)(random);
+    };
+    std::uint64_t impacts = 0;
+    for (int k = 0; k < 300; ++k) {
+        const std::array restitutions{0.0, 1e-9, 0.5, 0.9, 1.0};
+        const double restitution = restitutions[static_cast<std::size_t>(k) % 5];
+        const double friction = k % 4 == 0 ? 0.3 : 0;
+        const double incline = k % 3 == 0 ? any(-1, 1) : 0;
+        const Vector2 normal{std::sin(incline), std::cos(incline)};
+        const double height = 0.25 + any(0, 3);
+        const double speed = any(-2, 2);
+        const double drag = std::exp(any(-14, 1));
+        const double mass = any(0.5, 2);
+        const auto run = [&](bool ceiling) {
+            Scene scene({.gravity = {0, -9.81}});
+            const MaterialId material =
+                scene.material({.restitution = restitution, .friction = friction});
+            scene.wall({.normal = normal, .material = material});
+            if (ceiling)
+                scene.wall({.point = {1e3 * normal[0], 1e3 * normal[1]},
+                            .normal = {-normal[0], -normal[1]}});
+            scene.disc({.at = {height * normal[0], height * normal[1]},
+                        .velocity = {k % 2 == 0 ? 0 : speed, speed},
+                        .radius = 0.25,
+                        .mass = mass,
+                        .drag = drag,
+                        .material = material});
+            return simulate(scene, {.t_end = 5, .max_events = 2000});
+        };
+        const SceneRun alone = run(false);
+        const SceneRun below = run(true);
+        ASSERT_EQ(alone.outcome, below.outcome) << k;
+        ASSERT_EQ(alone.statistics.impacts, below.statistics.impacts) << k;
+        ASSERT_EQ(alone.statistics.waves, below.statistics.waves) << k;
+        ASSERT_EQ(alone.events.size(), below.events.size()) << k;
+        for (std::size_t e = 0; e < alone.events.size(); ++e) {
+            EXPECT_EQ(alone.events[e].t, below.events[e].t) << k;
+            EXPECT_EQ(alone.events[e].number, below.events[e].number) << k;
+            EXPECT_EQ(alone.events[e].before, below.events[e].before) << k;
+            EXPECT_EQ(alone.events[e].after, below.events[e].after) << k;
+            EXPECT_EQ(alone.events[e].impulse, below.events[e].impulse) << k;
+        }
+        EXPECT_EQ(alone.bodies[0].at, below.bodies[0].at) << k;
+        EXPECT_EQ(alone.bodies[0].velocity, below.bodies[0].velocity) << k;
+        impacts += alone.statistics.impacts;
+    }
+    EXPECT_GT(impacts, 1000u);
+}
+
 TEST(Discs, ABallThatBouncesAloneCanBeCancelled)
 {
     Scene scene({.gravity = {0, -9.81}});
