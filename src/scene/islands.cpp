@@ -54,6 +54,7 @@ Islands::Islands(World& world)
 
 void Islands::join(World& world)
 {
+    if (!world.any_drag && world.scene.springs().empty()) return;
     const auto count = static_cast<std::uint32_t>(world.bodies.size());
     std::vector<std::uint32_t> parent(count);
     std::iota(parent.begin(), parent.end(), 0U);

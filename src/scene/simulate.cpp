@@ -43,6 +43,15 @@ void validate(const SceneOptions& o)
 
 namespace {
 
+/// Room for the events of all groups, where the first `number` groups have had `known` events: as
+/// if the others were alike, with a quarter to spare, but not much more than is known.
+std::size_t room_for(std::size_t known, std::size_t number, std::size_t groups)
+{
+    const double each = static_cast<double>(known) / static_cast<double>(number);
+    const auto alike = static_cast<std::size_t>(1.25 * each * static_cast<double>(groups));
+    return std::clamp(alike, 2 * known, 64 * known);
+}
+
 /// Runs all groups until `t_end`; returns the earliest failure.
 std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
 {
@@ -54,10 +63,8 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
     for (std::size_t number = 0; number < groups.size(); ++number) {
         const auto group = groups[number];
         const std::size_t known = run.events.size();
-        // One group seldom adds more than half of the present number.
-        if (number > 0 && 2 * known > run.events.capacity()) {
-            const std::size_t alike = known / number * groups.size();
-            reserve_large(run.events, std::clamp(alike + alike / 8, 4 * known, 64 * known));
+        if (number > 0 && known + known / 8 > run.events.capacity()) {
+            reserve_large(run.events, room_for(known, number, groups.size()));
         }
         GroupResult result = runner.run(group, std::move(run.events), run.samples);
         run.events = std::move(result.events);

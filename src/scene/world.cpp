@@ -65,6 +65,7 @@ World::World(const Scene& from, const SceneOptions& with)
         body.inverse_mass = 1 / disc.mass;
         body.material = disc.material.index;
         bodies.push_back(body);
+        any_drag = any_drag || disc.drag > 0;
     }
     for (const bool walls : {true, false}) {
         std::uint32_t index = 0;

@@ -129,6 +129,7 @@ struct World {
         Vector2 c3{}, c4{};  ///< terms of degree 3 and 4
         Vector2 sweep{};     ///< bounds of the distances along x and y from the start of the step
     };
+    bool any_drag = false;              ///< whether drag slows a body
     std::vector<Bend> bends;            ///< of bodies, where there are islands
     std::vector<Face> faces;            ///< walls first, then terrain, then moving faces
     std::uint32_t wall_count = 0;       ///< walls that do not move
