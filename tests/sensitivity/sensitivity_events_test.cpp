@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "ricochet/hybrid/filippov.hpp"
 #include "ricochet/sensitivity/sensitivities.hpp"
 #include "sensitivity_systems.hpp"
 
@@ -484,6 +485,34 @@ TEST(SensitivityThroughEvents, AGuardThatIsPutOnItsSurfaceAndLeavesItEndsTheDeri
         EXPECT_FALSE(all.undefined_at);
         EXPECT_NEAR(all.state(1, 0), -rate, 1e-12);
     }
+}
+
+/// A motion that meets the surface x = p from below; beyond it x' = y - 5e-4.
+struct Ramp {
+    using State = X2;
+    static constexpr std::size_t surface_count = 1;
+    double p = 0;
+
+    [[nodiscard]] double surface(std::size_t, double, const X2& x) const { return x[0] - p; }
+    void field(std::size_t region, double, const X2& x, X2& dxdt) const
+    {
+        dxdt = {region == 0 ? 1 : x[1] - 5e-4, 0};
+    }
+};
+
+// Sliding keeps x = p, whatever y is, though a y that is larger by 5e-4 would not slide.
+TEST(SensitivityThroughEvents, SlidingMovesWithItsSurface)
+{
+    using Sliding = Filippov<Ramp>;
+    const Parameter<Sliding> p{
+        .with = [](double value) { return Sliding(Ramp{value}); }, .nominal = 0, .start = {0, 1}};
+    const auto s = sensitivities(Sliding(), {-1.0, 0.0}, {.parameters = {p}}, {.t_end = 2});
+    ASSERT_EQ(s.events.size(), 1u);
+    EXPECT_FALSE(s.undefined_at);
+    EXPECT_EQ(s.run.mode, Sliding::mode_of(Place::sliding));
+    EXPECT_NEAR(s.state(0, 0), 0, 1e-9);
+    EXPECT_NEAR(s.state(0, 2), 1, 1e-9);
+    EXPECT_NEAR(s.state(1, 2), 1, 1e-9);
 }
 
 /// A ball whose floor is known only by its sign.

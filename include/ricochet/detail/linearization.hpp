@@ -101,6 +101,14 @@ template <class System, class X, class... Which>
     }
 }
 
+/// A system whose resets at guards only put the state where it is but for rounding and drift. They
+/// are not differentiated: between the neighbouring points they may decide otherwise.
+template <class System>
+concept ResetsSettle = requires
+{
+    requires System::resets_settle;
+};
+
 // --- the kinds of reset, with a common interface ---
 
 /// The reset of one guard, as the run applies it to a set of one.
@@ -108,6 +116,12 @@ struct ResetOf {
     std::size_t which;
 
     [[nodiscard]] FiredGuards all() const noexcept { return FiredGuards(std::span(&which, 1)); }
+
+    template <class System>
+    [[nodiscard]] static constexpr bool settles() noexcept
+    {
+        return ResetsSettle<System>;
+    }
 
     template <class System, class X>
     [[nodiscard]] Mode apply(const System& system, Mode mode, double t, X& x) const
@@ -121,6 +135,7 @@ struct ResetOf {
     template <class System, class X>
     [[nodiscard]] bool derive(const System& system, const BeforeReset<X>& at, X& s) const
     {
+        if (settles<System>()) return true;
         if constexpr (ResetsTogether<System, X>) {
             return exact_reset(system, at, s, FiredGuards(std::span(&which, 1)));
         } else if constexpr (CountsGuards<System>) {
@@ -145,6 +160,12 @@ struct ResetSet {
     FiredGuards fired;
 
     [[nodiscard]] FiredGuards all() const noexcept { return fired; }
+
+    template <class System>
+    [[nodiscard]] bool settles() const noexcept
+    {
+        return ResetsSettle<System> && !fired.time_event();
+    }
 
     template <class System, class X>
     [[nodiscard]] Mode apply(const System& system, Mode mode, double t, X& x) const
@@ -183,6 +204,7 @@ struct ResetSet {
     template <class System, class X>
     [[nodiscard]] bool derive(const System& system, const BeforeReset<X>& at, X& s) const
     {
+        if (settles<System>()) return true;
         if constexpr (ResetsTogether<System, X>) {
             return exact_reset(system, at, s, fired);
         } else {
@@ -447,6 +469,7 @@ public:
     {
         if constexpr (requires { reset.all(); }) {
             X by = x;
+            if (reset.template settles<System>()) return zeros_shaped_like(by);
             if (exact_[j].reset && resets(reset.all()) &&
                 exact_[j].reset(reset.all(), mode, t, numbers_of(x), numbers_of(by))) {
                 return by;

@@ -101,6 +101,9 @@ class Filippov : public detail::FilippovState<Fields> {
 public:
     static constexpr bool unchecked_names = true;  // time events only where the fields have them
     static constexpr bool forward_only = true;     ///< runs backward in time are refused
+    /// A reset at surfaces removes rounding and drift, which depend on neither the state nor the
+    /// parameters: its derivative is the identity.
+    static constexpr bool resets_settle = true;
     static constexpr std::size_t surface_count = Fields::surface_count;
     static constexpr std::size_t guards_per_surface = 4;
     static constexpr std::size_t guard_count = guards_per_surface * surface_count;
