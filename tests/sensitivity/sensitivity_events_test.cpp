@@ -487,6 +487,61 @@ TEST(SensitivityThroughEvents, AGuardThatIsPutOnItsSurfaceAndLeavesItEndsTheDeri
     }
 }
 
+/// At x = 0 y loses one, and rises from then on, or not; where it falls below zero, it is set to
+/// five.
+struct CarriedToSurface {
+    using State = X2;
+    double rate = 1;  ///< of y from then on
+    double keep = 1;
+    static constexpr std::size_t guard_count = 2;
+
+    template <class X>
+    void flow(double, const X& x, X& dxdt) const
+    {
+        dxdt[0] = -1;
+        dxdt[1] = x[0] > 5 ? rate : 0;
+    }
+    template <class X>
+    [[nodiscard]] double guard(std::size_t which, double, const X& x) const
+    {
+        return x[which];
+    }
+    template <class X>
+    void reset(std::size_t which, double, X& x) const
+    {
+        if (which == 0) {
+            x[0] = 10;
+            x[1] = keep * (x[1] - 1);
+        } else {
+            x[1] = 5;
+        }
+    }
+};
+
+// From y = 1 the run is put on zero and does not leave it downward; neighbours that are carried
+// below zero are set to five.
+TEST(SensitivityThroughEvents, AGuardThatIsCarriedOntoItsSurfaceEndsTheDerivatives)
+{
+    const Options options{.t_end = 1.5};
+    for (const double rate : {1.0, 0.0}) {
+        const CarriedToSurface system{.rate = rate};
+        const auto at_zero = sensitivities(system, {1.0, 1.0}, {}, options);
+        ASSERT_EQ(at_zero.events.size(), 1u);
+        ASSERT_TRUE(at_zero.undefined_at) << rate;
+        EXPECT_EQ(at_zero.undefined_at->event, 0u);
+        EXPECT_EQ(at_zero.undefined_at->reason, Undefined::simultaneous);
+        EXPECT_TRUE(std::isnan(at_zero.state(1, 1)));
+
+        const auto above = sensitivities(system, {1.0, 1.01}, {}, options);
+        EXPECT_FALSE(above.undefined_at);
+        EXPECT_NEAR(above.state(1, 1), 1, 1e-12);
+        const auto all =
+            sensitivities(CarriedToSurface{.rate = rate, .keep = 0}, {1.0, 1.0}, {}, options);
+        EXPECT_FALSE(all.undefined_at);
+        EXPECT_NEAR(all.state(1, 0), -rate, 1e-12);
+    }
+}
+
 /// A motion that meets the surface x = p from below; beyond it x' = y - 5e-4.
 struct Ramp {
     using State = X2;

@@ -192,17 +192,22 @@ public:
         return undefined;
     }
 
-    /// Whether the last event has put a guard on its surface that it then leaves, while some
-    /// neighbouring motions are put before the surface, and cross it.
-    [[nodiscard]] bool leaves_surface(const Motion<X>& after, const LastEvent& last) const
+    /// Whether the events of one time, by which `before` became `after`, have put a guard on its
+    /// surface, and some neighbouring motions beside it, where it makes a difference: where they
+    /// then cross the surface, or where the guard came from before it, so that they are carried
+    /// across. A guard that does not leave its surface has neighbours on both sides.
+    [[nodiscard]] bool leaves_surface(const Motion<X>& before, const Motion<X>& after,
+                                      const LastEvent& last) const
     {
         if constexpr (Guarded<System, X>) {
             for (std::size_t i = 0; i < guard_count_of<X>(system()); ++i) {
+                if (!has_reset_in(i, after)) continue;
                 const Slope slope = slope_at(i, after);
-                if (crosses_here(i, after, slope, last) && counts(i, slope.rate) &&
-                    !agree(moves(i, after, slope.rate), last.dt, same_derivative)) {
-                    return true;
-                }
+                if (!(std::fabs(slope.guard) <= slope.blur)) continue;
+                const bool stays = slope.rate == 0;
+                if (!stays && grazes(i, after, slope, after.t - last.flight_start)) continue;
+                const bool matters = stays || counts(i, slope.rate) || comes_from_before(i, before);
+                if (matters && !all_on_surface(i, after, slope.rate, last.dt)) return true;
             }
         }
         return false;
@@ -419,11 +424,52 @@ private:
     [[nodiscard]] bool crosses_here(std::size_t which, const Motion<X>& motion, const Slope& slope,
                                     const LastEvent& last) const
     {
-        const GuardInfo info = guard_info_of<X>(system(), which);
-        return info.resets && !info.boolean && std::fabs(slope.guard) <= slope.blur &&
-               call_enabled_in(system(), which, motion.mode) &&
-               call_enabled_at(system(), which, motion.mode, motion.t, motion.x) &&
+        return std::fabs(slope.guard) <= slope.blur && has_reset_in(which, motion) &&
                !grazes(which, motion, slope, motion.t - last.flight_start);
+    }
+
+    /// Whether the guard has a value and a reset, and is examined here.
+    [[nodiscard]] bool has_reset_in(std::size_t which, const Motion<X>& motion) const
+    {
+        const GuardInfo info = guard_info_of<X>(system(), which);
+        return info.resets && !info.boolean && call_enabled_in(system(), which, motion.mode) &&
+               call_enabled_at(system(), which, motion.mode, motion.t, motion.x);
+    }
+
+    /// Whether the guard is clearly on the side of its surface from which crossing it counts.
+    [[nodiscard]] bool comes_from_before(std::size_t which, const Motion<X>& motion) const
+    {
+        if (!call_enabled_in(system(), which, motion.mode)) return false;
+        const Slope slope = slope_at(which, motion);
+        if (!(std::fabs(slope.guard) > slope.blur)) return false;
+        const Crossing crossing = guard_info_of<X>(system(), which).crossing;
+        return crossing == Crossing::either || (slope.guard > 0) == (crossing == Crossing::falling);
+    }
+
+    /// Whether neighbouring motions that are put here at an event that moves by dt are put on the
+    /// surface of this guard, too.
+    [[nodiscard]] bool all_on_surface(std::size_t which, const Motion<X>& m, double rate,
+                                      const Eigen::VectorXd& dt) const
+    {
+        if (rate != 0) return agree(moves(which, m, rate), dt, same_derivative);
+        for (std::size_t j = 0; j < columns(); ++j) {
+            const X s = column_of(m.derivatives, j, m.x);
+            double change = linearization_.guard_along(which, m.mode, m.t, m.x, s);
+            double size = 0;
+            X part = zeros_shaped_like(s);
+            for_each_component(s, [&](auto i) {
+                part[i] = s[i];
+                size += std::fabs(linearization_.guard_along(which, m.mode, m.t, m.x, part));
+                part[i] = 0;
+            });
+            if (const auto p = parameter_of(j)) {
+                const double by = linearization_.guard_by(*p, which, m.mode, m.t, m.x);
+                change += by;
+                size += std::fabs(by);
+            }
+            if (std::fabs(change) > same_derivative * size) return false;
+        }
+        return true;
     }
 
     /// Whether an event is a crossing in the direction of this rate.

@@ -146,11 +146,13 @@ public:
         return saltation_.crossing(which, motion_at(mode, t, y), last_event_of(y));
     }
 
-    /// Whether an event at t [s] after which the state is y has put a guard on its surface, and
-    /// some neighbouring motions before it.
-    [[nodiscard]] bool leaves_surface(Mode mode, double t, const State& y) const
+    /// Whether the events at t [s], which led from one mode and state to the other, have put a
+    /// guard on its surface, and some neighbouring motions beside it, where it makes a difference.
+    [[nodiscard]] bool leaves_surface(double t, Mode mode_before, const State& before,
+                                      Mode mode_after, const State& after) const
     {
-        return saltation_.leaves_surface(motion_at(mode, t, y), last_event_of(y));
+        return saltation_.leaves_surface(motion_at(mode_before, t, before),
+                                         motion_at(mode_after, t, after), last_event_of(after));
     }
 
     /// Derivatives of the time of a time event at t [s].

@@ -174,9 +174,14 @@ private:
         }
         const bool is_last = k + 1 == flat_.events.size() || flat_.events[k + 1].t != event.t;
         const bool acts = event.after != event.before || event.mode_after != event.mode_before;
-        if (reason == Undefined::no && is_last && acts &&
-            variational_.leaves_surface(event.mode_after, event.t, event.after)) {
-            reason = Undefined::simultaneous;
+        if (reason == Undefined::no && is_last && acts) {
+            std::size_t first = k;
+            while (first > 0 && flat_.events[first - 1].t == event.t) --first;
+            const Event<Flat>& start = flat_.events[first];
+            if (variational_.leaves_surface(event.t, start.mode_before, start.before,
+                                            event.mode_after, event.after)) {
+                reason = Undefined::simultaneous;
+            }
         }
         if (reason != Undefined::no) result_.undefined_at = UndefinedAt{k, reason};
     }
