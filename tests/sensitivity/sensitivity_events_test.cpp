@@ -542,6 +542,59 @@ TEST(SensitivityThroughEvents, AGuardThatIsCarriedOntoItsSurfaceEndsTheDerivativ
     }
 }
 
+/// A clock c; when it has run down, y loses two, and where y falls below zero, resets change it.
+struct Pushed {
+    using State = std::array<double, 3>;
+    bool twice = false;  ///< whether two of them set z
+    static constexpr std::size_t guard_count = 3;
+
+    template <class X>
+    void flow(double, const X&, X& dxdt) const
+    {
+        dxdt[0] = -1;
+        dxdt[1] = dxdt[2] = 0;
+    }
+    template <class X>
+    [[nodiscard]] double guard(std::size_t which, double, const X& x) const
+    {
+        if (which < 2) return x[which];
+        return twice ? x[1] + 0.5 : 1.0;
+    }
+    template <class X>
+    void reset(std::size_t which, double, X& x) const
+    {
+        if (which == 0) {
+            x[0] = 10;
+            x[1] -= 2;
+        } else if (which == 1) {
+            if (twice) x[2] = 4 + 2 * x[1];
+            x[1] = -1.8 - 0.8 * x[1];
+        } else {
+            x[2] = 3 + x[1];
+        }
+    }
+};
+
+// The second reset leaves y = -1 where it is, but not its neighbours.
+TEST(SensitivityThroughEvents, AResetThatChangesNothingStillHasADerivative)
+{
+    const auto s = sensitivities(Pushed{}, {1.0, 1.0, 0.0}, {}, {.t_end = 1.5});
+    ASSERT_EQ(s.events.size(), 2u);
+    EXPECT_FALSE(s.undefined_at);
+    EXPECT_EQ(s.run.x[1], -1);
+    EXPECT_NEAR(s.state(1, 1), -0.8, 1e-12);
+}
+
+// Both resets set z to two, but to different values for every neighbour.
+TEST(SensitivityThroughEvents, ResetsThatAgreeOnlyHereEndTheDerivatives)
+{
+    const auto s = sensitivities(Pushed{.twice = true}, {1.0, 1.0, 0.0}, {}, {.t_end = 1.5});
+    EXPECT_EQ(s.run.outcome, Outcome::reached_end);
+    EXPECT_EQ(s.run.x[2], 2);
+    ASSERT_TRUE(s.undefined_at);
+    EXPECT_EQ(s.undefined_at->reason, Undefined::simultaneous);
+}
+
 /// A motion that meets the surface x = p from below; beyond it x' = y - 5e-4.
 struct Ramp {
     using State = X2;

@@ -17,6 +17,7 @@
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <type_traits>
 #include <utility>
@@ -531,11 +532,23 @@ private:
             fired, [this](std::size_t which) { return guard_info_of<X>(system_, which).resets; });
     }
 
+    /// The state after a reset; NaN if the resets of a set contradict each other.
     template <class Reset>
     [[nodiscard]] static X reset_of(const System& system, const Reset& reset, Mode mode, double t,
                                     X x)
     {
-        (void)reset.apply(system, mode, t, x);
+        if constexpr (requires(Conflict & conflict) {
+                          reset.apply(system, mode, t, x, conflict);
+                      }) {
+            Conflict conflict;
+            (void)reset.apply(system, mode, t, x, conflict);
+            if (conflict.any()) {
+                for_each_component(
+                    x, [&](auto i) { x[i] = std::numeric_limits<double>::quiet_NaN(); });
+            }
+        } else {
+            (void)reset.apply(system, mode, t, x);
+        }
         return x;
     }
 

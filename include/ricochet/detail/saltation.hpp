@@ -213,6 +213,16 @@ public:
         return false;
     }
 
+    /// Whether all guards of a set are on their surfaces, and do not cross them.
+    [[nodiscard]] bool holds(const FiredGuards& fired, const Motion<X>& motion) const
+    {
+        if (fired.time_event()) return false;
+        return std::all_of(fired.begin(), fired.end(), [&](std::size_t which) {
+            const Slope slope = slope_at(which, motion);
+            return std::fabs(slope.guard) <= slope.blur && slope.rate == 0;
+        });
+    }
+
     /// Column j as a vector like x.
     [[nodiscard]] static X column_of(const Eigen::MatrixXd& derivatives, std::size_t j, X x)
     {
@@ -375,7 +385,8 @@ private:
         }
         if (all_pushed(acting, motion, last)) {
             pass(ResetSet{fired}, last.dt, motion);
-            return Undefined::no;
+            // Resets that agree here may contradict each other beside it.
+            return motion.derivatives.allFinite() ? Undefined::no : Undefined::simultaneous;
         }
         const Undefined undefined = pass_in_all_orders(acting, motion, last);
         if (undefined != Undefined::no) return undefined;

@@ -261,7 +261,10 @@ public:
         // A guard that holds the motion in place, repeatedly at one time, also holds the
         // derivatives.
         const bool again = saltation_.at_one_time(last_event(y), t);
-        if (again && next == mode && same(before, after)) return mode;
+        if (again && next == mode && same(before, after) &&
+            saltation_.holds(fired, motion_at(mode, t, y))) {
+            return mode;
+        }
         transform(motion_at(mode, t, y), y, next, after, [&](auto& motion, auto& last) {
             return saltation_.pass_set(fired, after, motion, last);
         });
