@@ -495,6 +495,26 @@ TEST(Sensitivity, ATimeEventThatMovesTooFarIsSaidToBeLost)
     EXPECT_NEAR(followed.events.back().dt[1], static_cast<double>(followed.events.size()), 1e-8);
 }
 
+// The differences move the event by about whole intervals, so that its neighbours take its place.
+TEST(Sensitivity, ATimeEventThatMovesByWholeIntervalsIsSaidToBeLost)
+{
+    Parameter<Doses> interval{.with = [](double i) { return Doses{i}; }, .nominal = 0.5};
+    for (const double start : {450.0, 500.0, 1000.0, 5000.0}) {
+        const Options options{.t_start = start, .t_end = start + 1.2};
+        const auto lost = sensitivities(Doses{}, {2.0}, {.parameters = {interval}}, options);
+        ASSERT_EQ(lost.events.size(), 2u);
+        ASSERT_TRUE(lost.undefined_at) << start;
+        EXPECT_EQ(lost.undefined_at->event, 0u);
+        EXPECT_EQ(lost.undefined_at->reason, Undefined::time_event_jumps);
+
+        Parameter<Doses> near = interval;
+        near.scale = 0.001;
+        const auto followed = sensitivities(Doses{}, {2.0}, {.parameters = {near}}, options);
+        EXPECT_FALSE(followed.undefined_at) << start;
+        EXPECT_NEAR(followed.events[0].dt[1], start / 0.5 + 1, 1e-4);
+    }
+}
+
 // --- requests ---
 
 TEST(Sensitivity, WithoutDirectionsItIsTheRunBitForBit)

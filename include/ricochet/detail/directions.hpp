@@ -3,10 +3,12 @@
 // The quantities with respect to which a run is differentiated.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <vector>
@@ -70,6 +72,15 @@ struct Neighbours {
     Stencil stencil;
     double h;
     std::vector<System> systems;
+    std::optional<System> closest{};  ///< at `close` of a step, for a system with time events
+    static constexpr double close = 1e-6;
+
+    /// The largest distance of the systems, in units of that of the closest.
+    [[nodiscard]] double widening() const noexcept
+    {
+        const auto [least, most] = std::ranges::minmax(stencil.offset);
+        return std::max(-least, most) / close;
+    }
 };
 
 /// Central differences, or one-sided ones at the edge of the parameter's range, where the
@@ -80,10 +91,14 @@ template <class System>
     const double size = std::fabs(parameter.nominal);
     const double h = step * (parameter.scale > 0 ? parameter.scale : size > 0 ? size : 1.0);
     const auto build = [&](const Stencil& stencil) {
-        Neighbours<System> neighbours{stencil, h, {}};
+        Neighbours<System> neighbours{stencil, h, {}, {}};
         neighbours.systems.reserve(stencil.points);
         for (std::size_t k = 0; k < stencil.points; ++k) {
             neighbours.systems.push_back(parameter.with(parameter.nominal + stencil.offset[k] * h));
+        }
+        if constexpr (Timed<System>) {
+            const double close = Neighbours<System>::close * stencil.offset[1];
+            neighbours.closest.emplace(parameter.with(parameter.nominal + close * h));
         }
         return neighbours;
     };

@@ -489,6 +489,12 @@ public:
                              [&](std::size_t k) { return function(around.systems[k]); });
     }
 
+    /// The systems around parameter j.
+    [[nodiscard]] const Neighbours<System>& around(std::size_t j) const noexcept
+    {
+        return parameters_[j];
+    }
+
 private:
     static constexpr bool has_exact_guard = [] {
         if constexpr (CountsGuards<System>) {

@@ -32,6 +32,7 @@
 #include <optional>
 #include <vector>
 
+#include "ricochet/detail/directions.hpp"
 #include "ricochet/detail/linearization.hpp"
 #include "ricochet/detail/undefined.hpp"
 #include "ricochet/hybrid/event.hpp"
@@ -135,7 +136,7 @@ public:
         if constexpr (Timed<System>) {
             const double reach = reach_of_time_event(t);
             for (std::size_t j = 0; j < linearization_.parameters(); ++j) {
-                bool lost = false;
+                bool lost = moves_beyond(linearization_.around(j), t, reach);
                 time.dt[index(initial_ + j)] =
                     linearization_.by_parameter(j, [&](const System& system) {
                         const double near = system.next_time_event(t - reach);
@@ -358,6 +359,15 @@ private:
         double reach = std::min(system().next_time_event(t) - t, 1 + std::fabs(t)) / 4;
         while (system().next_time_event(t - reach) < t && t - reach / 2 < t) reach /= 2;
         return reach;
+    }
+
+    /// Whether the differences by a parameter move the time event at t farther than `reach`, as the
+    /// closest system predicts: from there on another event may take its place.
+    [[nodiscard]] static bool moves_beyond(const Neighbours<System>& around, double t, double reach)
+    {
+        const double moved = std::fabs(around.closest->next_time_event(t - reach) - t);
+        const double rounding = 8 * epsilon * std::fabs(t);
+        return !(std::max(moved - rounding, 0.0) * around.widening() < reach);
     }
 
     [[nodiscard]] Undefined pass_time_event(Motion<X>& motion, LastEvent& last) const
