@@ -2,6 +2,14 @@
 //
 // Euler, Rk4, CashKarp54, Dopri5 and Fehlberg78 of `methods.hpp` have the bits of odeint's
 // steppers and compile without it.
+//
+// Instead of the state a stepper is given the departure from the tangent at the start of the step,
+//
+//     w = x - x0 - s x'(t0),    w(0) = 0,    at the offset s from t0
+//
+// whose rounding is smaller. The step is the same for a Runge-Kutta method in which every stage
+// passes its own time to the flow. A stepper that leaves the time out, or that splits or normalises
+// the state, takes another step: it is refused when the run is made.
 #pragma once
 
 #include <boost/numeric/odeint/algebra/default_operations.hpp>

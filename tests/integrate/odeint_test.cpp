@@ -156,6 +156,89 @@ TEST(Odeint, AUsersOwnStepperNeedsOnlyTheStepInPlace)
     EXPECT_NEAR(step.x1()[1], -0.01, 1e-18);
 }
 
+/// The explicit midpoint rule for flows that do not depend on time.
+struct TimelessMidpoint {
+    using stepper_category = odeint::stepper_tag;
+    static constexpr unsigned short order() { return 2; }
+    template <class System>
+    void do_step(System system, X& x, double t, double dt)
+    {
+        X k;
+        system(x, k, t);
+        X middle = {x[0] + dt / 2 * k[0], x[1] + dt / 2 * k[1]};
+        system(middle, k, t);
+        x = {x[0] + dt * k[0], x[1] + dt * k[1]};
+    }
+};
+
+/// Euler's method with a velocity that is ahead of the position.
+struct SymplecticEuler {
+    using stepper_category = odeint::stepper_tag;
+    static constexpr unsigned short order() { return 1; }
+    template <class System>
+    void do_step(System system, X& x, double t, double dt)
+    {
+        X k;
+        system(x, k, t);
+        x[1] += dt * k[1];
+        system(x, k, t);
+        x[0] += dt * k[0];
+    }
+};
+
+/// A method of order 4 that puts the state back on the unit circle.
+struct Normalising {
+    using stepper_category = odeint::stepper_tag;
+    static constexpr unsigned short order() { return 4; }
+    template <class System>
+    void do_step(System system, X& x, double t, double dt)
+    {
+        odeint::runge_kutta4_classic<X>().do_step(system, x, t, dt);
+        const double size = std::hypot(x[0], x[1]);
+        x = {x[0] / size, x[1] / size};
+    }
+};
+
+/// Heun's method, which keeps the rate at the end of a step for the next one.
+struct Remembering {
+    using stepper_category = odeint::stepper_tag;
+    static constexpr unsigned short order() { return 2; }
+    template <class System>
+    void do_step(System system, X& x, double t, double dt)
+    {
+        if (first) system(x, k1, t);
+        first = false;
+        X k2;
+        const X there = {x[0] + dt * k1[0], x[1] + dt * k1[1]};
+        system(there, k2, t + dt);
+        x = {x[0] + dt / 2 * (k1[0] + k2[0]), x[1] + dt / 2 * (k1[1] + k2[1])};
+        system(x, k1, t + dt);
+    }
+    bool first = true;
+    X k1{};
+};
+
+template <class Stepper>
+std::string refusal_of_stepper()
+{
+    return refusal([] {
+        (void)integrate(WalledOscillator(), X{1, 0}, {.t_end = 1, .step = 0.1},
+                        FixedStep<ThisStepper<Stepper>>{});
+    });
+}
+
+TEST(Odeint, AStepperThatTakesAnotherStepOfADepartureIsRefused)
+{
+    EXPECT_EQ(refusal_of_stepper<Midpoint>(), "accepted");
+    EXPECT_EQ(refusal_of_stepper<odeint::modified_midpoint<X>>(), "accepted");
+    EXPECT_EQ(refusal_of_stepper<odeint::runge_kutta_dopri5<X>>(), "accepted");
+    EXPECT_NE(refusal_of_stepper<TimelessMidpoint>().find("time of every stage"),
+              std::string::npos);
+    EXPECT_NE(refusal_of_stepper<SymplecticEuler>().find("departures"), std::string::npos);
+    EXPECT_NE(refusal_of_stepper<Normalising>().find("departures"), std::string::npos);
+    EXPECT_NE(refusal_of_stepper<Remembering>().find("departures"), std::string::npos);
+}
+
 /// A state of run-time size that cannot be resized.
 struct Unresizable {
     std::vector<double> components;

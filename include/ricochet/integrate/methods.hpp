@@ -16,7 +16,7 @@ namespace ricochet {
 
 /// Method made of a complete stepper type for one state type, odeint's (see `ricochet/odeint.hpp`)
 /// or the user's own, with odeint's `do_step`. It must be a one-step method: a multistep method
-/// keeps earlier steps, which an event makes invalid.
+/// keeps earlier steps, which an event makes invalid. Its form is in `ricochet/odeint.hpp`.
 template <class GivenStepper>
 struct ThisStepper {
     template <class State>
