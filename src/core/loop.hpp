@@ -242,6 +242,7 @@ private:
 
         double h_next = 0;
         Statistics counts{};
+        std::uint64_t disabled = 0;
         std::size_t events = 0, samples = 0, pieces = 0, next_sample = 0;
         std::size_t tentative = 0;  ///< number of steps that were not yet closed
         bool planned = false;       ///< the guards are left alone until their deadlines
@@ -257,7 +258,7 @@ private:
     void plan_anew()
     {
         if (!replans_) return;
-        bank_.wake_all(step_, last_h_, calls(), false);
+        bank_.wake_all(step_, last_h_, calls(), newly_armed_);
         newly_armed_ = true;
         replans_ = false;
     }

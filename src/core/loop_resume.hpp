@@ -44,6 +44,7 @@ inline void Loop<X, single>::mark_step() noexcept
     } else {
         mark_->counts.rejected = run_.statistics.rejected;
     }
+    mark_->disabled = search_.disabled;
     mark_->events = run_.events.size();
     mark_->samples = run_.trajectory.t.size();
     mark_->pieces = run_.solution.size();
@@ -82,6 +83,7 @@ void Loop<X, single>::go_back_to_mark()
     Mark& mark = *mark_;
     std::size_t samples = mark.samples;
     std::size_t pieces = mark.pieces;
+    std::uint64_t rejected = mark.counts.rejected;
     std::uint64_t steps = defers_ ? mark.counts.steps : run_.statistics.steps;
     if (mark.everything) {
         steps = mark.counts.steps;
@@ -105,21 +107,23 @@ void Loop<X, single>::go_back_to_mark()
         last_h_ = first.last_h;
         samples -= mark.next_sample - first.samples;
         pieces = first.pieces;
+        rejected = first.rejected;
         steps -= mark.tentative;
         mark.next_sample = first.samples;
     }
+    if (defers_) planner_->steps().clear();
     if (mark.planned) {
         // Deadlines may be half renewed: they are found again at the start of the step.
-        planner_->steps().clear();
         replans_ = true;
+        watching_ = false;
     }
-    run_.statistics.rejected = mark.counts.rejected;
     if (mark.everything || defers_) {
         const Statistics seen = std::exchange(run_.statistics, mark.counts);
         run_.statistics.guard_calls = seen.guard_calls;
         run_.statistics.network_calls = seen.network_calls;
         run_.statistics.bound_calls = seen.bound_calls;
     }
+    run_.statistics.rejected = rejected;
     run_.statistics.steps = steps;
     run_.events.resize(mark.events);
     run_.trajectory.t.resize(samples);
@@ -128,6 +132,7 @@ void Loop<X, single>::go_back_to_mark()
     run_.outcome = Outcome::reached_end;
     this->forget_cause();
     next_sample_ = mark.next_sample;
+    search_.disabled = mark.disabled;
     ended_ = false;
     pending_ = Engine::Pending::nothing;
     if (guarded_) {
