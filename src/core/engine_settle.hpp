@@ -70,6 +70,7 @@ inline void EventEngine<X, single>::arm_at_start()
 {
     enable_guards();
     newly_armed_ = true;
+    watching_ = false;
     last_h_ = h_next_;
     bank_.begin_phase(step_.time(0));
     bank_.sample_start(step_, calls(), h_next_);

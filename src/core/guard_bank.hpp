@@ -91,11 +91,16 @@ public:
         }
     }
 
-    /// Makes all guards examined again from the next step on. `sampled`: their values are known.
+    /// Makes all guards examined again from the next step on. `sampled`: they have just been armed,
+    /// so that their values are known, and the rates of those that have left their surfaces, which
+    /// are not always those of the flow.
     void wake_all(const Step<X>& step, double scale, std::uint64_t& calls, bool sampled)
     {
         if (!sampled) sample_values(step.mode(), step.time(0), step.x0(), calls, g0_);
-        sample_rates(arrival_of(step, scale), calls, rate0_);
+        sample_rates(arrival_of(step, scale), calls, sampled ? rate1_ : rate0_);
+        for (std::size_t i = 0; sampled && i < size(); ++i) {
+            if (std::isnan(rate0_[i])) rate0_[i] = rate1_[i];
+        }
         for (std::size_t i = 0; i < size(); ++i) {
             records_[i].deferred = false;
             arm(i, records_[i].side);

@@ -391,7 +391,7 @@ private:
         cut_.mode_before = step_.mode();
         if (!this->settle()) {
             if (ended_) return Verdict::ended;
-            if (defers_ && !resting_) this->begin_plan();
+            if (defers_ && !resting_ && !planner_->steps_aside()) this->begin_plan();
             return resting_ ? Verdict::rests : Verdict::stands;
         }
         cut_.s = 0;
