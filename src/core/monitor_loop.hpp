@@ -202,6 +202,7 @@ public:
             throw;
         }
         step_.restart(place_);
+        this->watching_ = false;
         this->forget_cause();
         this->pending_ = Pending::nothing;
         started_ = true;

@@ -710,6 +710,39 @@ TEST(Monitor, AMeteredGateChangesNothingWhicheverWayIsTaken)
     expect_same(checking);  // once more, after a run in which every step was checked
 }
 
+/// A point that goes back and forth between two walls.
+struct BouncingBox {
+    using State = X;
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], 0}; }
+    double guard(double, const X& x) const { return 1 - std::fabs(x[0]); }
+    void reset(double, X& x) const { x[1] = -x[1]; }
+    double speed_bound(double, const X& x) const { return std::fabs(x[1]); }
+};
+
+TEST(Monitor, ASnapshotOfPlannedStepsIsRestoredWhereEveryStepIsChecked)
+{
+    const BouncingBox box;
+    using Decision = MeterOptions::Decision;
+    EventMonitor planning(box, X{}, {}, metered(Decision::always));
+    EventMonitor checking(box, X{}, {}, metered(Decision::every_step));
+    Rk4Host<BouncingBox, 2> host(box, 0, X{0, 1});
+    ASSERT_EQ(planning.start(Instant{0}, host.x(), host.rate(), 0.1), Verdict::stands);
+    ASSERT_EQ(checking.start(Instant{0}, host.x(), host.rate(), 0.1), Verdict::stands);
+    const auto take_step = [&](auto& monitor) {
+        const Rk4Host<BouncingBox, 2>::Step step(host, 0.1);
+        const Verdict verdict = monitor.examine(step);
+        if (verdict == Verdict::stands) host.accept(step);
+        return verdict;
+    };
+    ASSERT_EQ(take_step(checking), Verdict::stands);
+    host.restart(Instant{0}, X{0, 1}, 0);
+    for (int k = 0; k < 3; ++k) ASSERT_EQ(take_step(planning), Verdict::stands);
+    checking.restore(planning.save());
+    int steps = 3;
+    for (; take_step(checking) == Verdict::stands; ++steps) ASSERT_LT(steps, 20);
+    EXPECT_NEAR(checking.cut().t.value, 1, 1e-14);
+}
+
 // --- saving ---
 
 TEST(Monitor, ASnapshotGoesOnWithTheSameBits)
