@@ -212,11 +212,6 @@ std::array<double, ArmScene::most_joints> ArmScene::torques(double t) const noex
     return last->answer;
 }
 
-std::size_t ArmScene::obstacle_edges() const noexcept
-{
-    return place_->edges.size();
-}
-
 ArmScene::Contact ArmScene::contact(Search search, const double* angles) const noexcept
 {
     Last::Loan last(place_->last);

@@ -131,8 +131,6 @@ public:
     /// Factor by which an impact multiplies all rates.
     [[nodiscard]] double reversal(const double* rates) const noexcept;
 
-    [[nodiscard]] std::size_t obstacle_edges() const noexcept;
-
 private:
     struct Joint {
         double middle, drive, spring, frequency, phase;

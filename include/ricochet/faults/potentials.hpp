@@ -146,13 +146,6 @@ using SlipPotential = StateDependentPotential<StateEvolution::slip, effect>;
 template <DirectEffect effect = DirectEffect::asinh>
 using PrzPotential = StateDependentPotential<StateEvolution::prz, effect>;
 
-/// d = -dDdag/dxi, the force that drives the state.
-template <PotentialPair Pair>
-[[nodiscard]] double driving_force(const Pair& pair, double v, double xi)
-{
-    return -pair.rate_potential(v, xi).xi;
-}
-
 /// Friction (5) and rate of the state (9) from the potentials alone.
 template <PotentialPair Pair>
 [[nodiscard]] FrictionAndRate evaluate(const Pair& pair, double v, double xi)
