@@ -90,6 +90,7 @@ public:
         out_.longest_step = longest * unit;
         StepController& controller = controller_;
         while (t_ < end) {
+            if (out_.statistics.steps >= options_.max_steps) return finish(Outcome::step_limit);
             const double left = end - t_;
             const double step = left <= h * (1 + 1e-9) ? left : h;
             const bool solved = attempt(step);
@@ -120,7 +121,6 @@ public:
             }
             if (options_.progress && !options_.progress(t_ * unit))
                 return finish(Outcome::cancelled);
-            if (out_.statistics.steps >= options_.max_steps) return finish(Outcome::step_limit);
         }
         return finish(Outcome::reached_end);
     }

@@ -84,6 +84,8 @@ public:
         out_.rupture.mean_velocities.front() = fault_.mean(now_.v) * fault_.velocity_unit();
         note_fastest(0);
         while (t_ < end) {
+            if (out_.rupture.statistics.steps >= options_.max_steps)
+                return finish(Outcome::step_limit);
             const double left = end - t_;
             const double step = left <= h * (1 + 1e-9) ? left : left < 2 * h ? left / 2 : h;
             const bool solved = attempt(step);
@@ -103,8 +105,6 @@ public:
             accept(step, step == left ? end : t_ + step);
             if (options_.progress && !options_.progress(t_ * unit))
                 return finish(Outcome::cancelled);
-            if (out_.rupture.statistics.steps >= options_.max_steps)
-                return finish(Outcome::step_limit);
         }
         return finish(Outcome::reached_end);
     }
@@ -338,7 +338,7 @@ private:
             crossing -= h * unit * std::log(fastest / level) / std::log(fastest / before);
         }
         if (before < level && fastest >= level) {
-            out_.earthquakes.push_back({.start = crossing, .mean_slip = mean});
+            out_.earthquakes.push_back({.start = crossing});
             slip_at_onset_ = mean;
         }
         if (out_.earthquakes.empty() || before < level) {

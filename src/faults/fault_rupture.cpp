@@ -129,6 +129,7 @@ public:
         start();
         out_.outcome = Outcome::reached_end;
         while (t_ < end && !at_rest()) {
+            if (out_.statistics.steps >= options_.max_steps) return finish(Outcome::step_limit);
             const double left = end - t_;
             const double step = left <= h * (1 + 1e-9) ? left : left < 2 * h ? 0.5 * left : h;
             const double error = attempt(step);
@@ -146,9 +147,6 @@ public:
             accept(step, step == left ? end : t_ + step);
             if (options_.progress && !options_.progress(t_ * fault_.time_unit())) {
                 return finish(Outcome::cancelled);
-            }
-            if (out_.statistics.steps >= options_.max_steps) {
-                return finish(Outcome::step_limit);
             }
         }
         return finish(at_rest() ? Outcome::at_rest : Outcome::reached_end);

@@ -477,6 +477,28 @@ TEST(FaultRateState, SnapshotsAndMeansAreThoseOfTheFields)
     EXPECT_EQ(r.step_times.size(), r.rupture.statistics.steps + 1);
 }
 
+TEST(FaultRateState, ARunThatEndsAtAnOnsetHasNoSlipOfItsEarthquakeYet)
+{
+    const StrikeSlipFault fault({.elements = 3});
+    FaultFriction friction{.overload = 1e-2};
+    friction.law.b = 0.03;
+    friction.law.d_rs = 0.03;
+    RuptureOptions options{.t_end = 4e8, .rtol = 1e-2};
+    const RateStateRupture whole = simulate(fault, options, friction);
+    ASSERT_FALSE(whole.earthquakes.empty());
+    const FaultEarthquake& first = whole.earthquakes.front();
+    options.progress = [&](double t) { return t < first.start; };
+    const RateStateRupture cut = simulate(fault, options, friction);
+    ASSERT_EQ(cut.earthquakes.size(), 1U);
+    EXPECT_EQ(cut.earthquakes[0].start, first.start);
+    EXPECT_GT(cut.rupture.mean_slips.back(), 0);
+    EXPECT_EQ(cut.earthquakes[0].mean_slip, 0);
+    // All steps of a run may be needed to reach its end.
+    options.progress = {};
+    options.max_steps = whole.rupture.statistics.steps;
+    EXPECT_EQ(simulate(fault, options, friction).rupture.outcome, Outcome::reached_end);
+}
+
 TEST(FaultRateState, RefusesWhatHasNoMeaning)
 {
     const StrikeSlipFault fault;

@@ -394,6 +394,26 @@ TEST(Rupture, EndsWhereItIsToldAndKeepsSnapshots)
     EXPECT_LT(cancelled.t, 2);
 }
 
+TEST(Rupture, ThatTakesAllItsStepsStillReachesItsEnd)
+{
+    const StrikeSlipFault fault({.elements = 2});
+    const auto expect_same_end = [&](RuptureOptions options, const auto&... how) {
+        const Rupture free = simulate(fault, options, how...);
+        options.max_steps = free.statistics.steps;
+        const Rupture bound = simulate(fault, options, how...);
+        EXPECT_EQ(bound.outcome, free.outcome);
+        EXPECT_EQ(bound.t, free.t);
+        --options.max_steps;
+        const Rupture cut = simulate(fault, options, how...);
+        EXPECT_EQ(cut.outcome, Outcome::step_limit);
+        EXPECT_EQ(cut.statistics.steps, options.max_steps);
+    };
+    for (const double t_end : {8.0, 1000.0}) {
+        expect_same_end({.t_end = t_end});
+        expect_same_end({.t_end = t_end, .step = 0.125}, BatheOptions{});
+    }
+}
+
 TEST(Rupture, HasTheSnapshotOfItsEndForAnyUnitOfTime)
 {
     for (int i = 0; i < 50; ++i) {
