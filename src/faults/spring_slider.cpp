@@ -292,9 +292,18 @@ private:
                                  ? start + options_.t_end
                                  : start + spacing_ * static_cast<double>(n);
             if (t > until) return;
-            out_.samples.push_back(
-                t == to.t || from.t == to.t ? to : between(from, to, slope(from), slope(to), t));
+            out_.samples.push_back(t == to.t || from.t == to.t ? to : inside(from, to, t));
         }
+    }
+
+    /// The state inside a step, from a step of shorter length. While the block sticks, its slip
+    /// rate is far below the rounding of the accelerations, from which a polynomial would follow.
+    [[nodiscard]] SliderState inside(const SliderState& from, const SliderState& to, double t) const
+    {
+        SliderState at = from;
+        if (!take(at, t - from.t).solved()) at = between(from, to, slope(from), slope(to), t);
+        at.t = t;
+        return at;
     }
 
     SliderRun stop(Outcome outcome)

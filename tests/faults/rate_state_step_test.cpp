@@ -250,6 +250,30 @@ TEST(SpringSlider, LocatesOnsetAndArrest)
     }
 }
 
+TEST(SpringSlider, SamplesAreInBalanceWhileTheBlockSticks)
+{
+    // The slip rate of the block falls to 1e-25 m/s, far below what its acceleration resolves, and
+    // friction is then the pull of the spring.
+    const double velocity = 1e-5;
+    SpringSlider slider{
+        .friction = {.a = 0.006, .b = 0.02, .f_star = 0.6, .v_star = velocity, .d_rs = 1e-4},
+        .block = {.mass = 0.01, .stiffness = 420, .normal_force = 10}};
+    const SpringBlock& block = slider.block;
+    slider.load = SliderLoad(10 * slider.friction.f_star / block.stiffness, 2 * velocity);
+    const SliderRun run = run_slider(slider, {0, 0, velocity, 0}, {.t_end = 300, .samples = 101});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_TRUE(run.events.empty());
+    int stuck = 0;
+    for (const SliderState& s : run.samples) {
+        EXPECT_GT(s.v, 0) << s.t;
+        if (s.v > 1e-3 * velocity) continue;
+        ++stuck;
+        const double pull = block.stiffness * (slider.load(s.t) - s.x) / block.normal_force;
+        EXPECT_NEAR(slider_friction(slider, s), pull, 1e-9) << s.t;
+    }
+    EXPECT_GT(stuck, 50);
+}
+
 TEST(SpringSlider, FollowsALoadThatReverses)
 {
     SliderCase c = a_case(2.0);
