@@ -123,7 +123,9 @@ public:
     Verdict hold(double t) override
     {
         if (!resting_ || ended_) throw_out_of_turn("hold", "it after a verdict `rests` alone");
-        if (!lies_before(step_.start().value, t)) throw_no_length("the time of `hold`", t);
+        if (!lies_before(step_.start().value, t) || !std::isfinite(t)) {
+            throw_no_length("the time of `hold`", t);
+        }
         const bool due = timed_ && !lies_before(t, time_event_);
         if (due && t != time_event_) throw_beyond_time_event(time_event_, t);
         step_.hold(t);
