@@ -830,7 +830,8 @@ TEST(MonitorRefusals, HoldsWithoutEnd)
 {
     const BouncingBall ball;
     EventMonitor monitor(ball, X{});
-    ASSERT_EQ(monitor.start(Instant{1}, X{0, 0}, X{0, -9.81}, 0.1), Verdict::rests);
+    ASSERT_EQ(monitor.start(Instant{1}, X{0, 0}, X{0, -9.81}, 0.1), Verdict::cut);
+    ASSERT_EQ(monitor.resume(0.1), Verdict::rests);
     EXPECT_EQ(monitor.must_stop_at(), inf);
     for (const double t : {inf, -inf, nan, 1.0, 0.0}) {
         EXPECT_THROW((void)monitor.hold(t), std::invalid_argument) << t;
