@@ -487,12 +487,13 @@ TEST(SensitivityThroughEvents, AGuardThatIsPutOnItsSurfaceAndLeavesItEndsTheDeri
     }
 }
 
-/// At x = 0 y loses one, and rises from then on, or not; where it falls below zero, it is set to
-/// five.
+/// At x = 0 y loses something, and rises from then on, or not; where it falls below zero, it is set
+/// to five.
 struct CarriedToSurface {
     using State = X2;
     double rate = 1;  ///< of y from then on
     double keep = 1;
+    double loss = 1;
     static constexpr std::size_t guard_count = 2;
 
     template <class X>
@@ -511,7 +512,7 @@ struct CarriedToSurface {
     {
         if (which == 0) {
             x[0] = 10;
-            x[1] = keep * (x[1] - 1);
+            x[1] = keep * (x[1] - loss);
         } else {
             x[1] = 5;
         }
@@ -540,6 +541,11 @@ TEST(SensitivityThroughEvents, AGuardThatIsCarriedOntoItsSurfaceEndsTheDerivativ
         EXPECT_FALSE(all.undefined_at);
         EXPECT_NEAR(all.state(1, 0), -rate, 1e-12);
     }
+    // A guard that stays on its surface, as it did before, is not put there.
+    const auto still =
+        sensitivities(CarriedToSurface{.rate = 0, .loss = 0}, {1.0, 0.0}, {}, options);
+    EXPECT_FALSE(still.undefined_at);
+    EXPECT_NEAR(still.state(1, 1), 1, 1e-12);
 }
 
 /// A clock c; when it has run down, y loses two, and where y falls below zero, resets change it.

@@ -196,7 +196,7 @@ public:
     /// Whether the events of one time, by which `before` became `after`, have put a guard on its
     /// surface, and some neighbouring motions beside it, where it makes a difference: where they
     /// then cross the surface, or where the guard came from before it, so that they are carried
-    /// across. A guard that does not leave its surface has neighbours on both sides.
+    /// across, or where the guard stays there.
     [[nodiscard]] bool leaves_surface(const Motion<X>& before, const Motion<X>& after,
                                       const LastEvent& last) const
     {
@@ -207,7 +207,8 @@ public:
                 if (!(std::fabs(slope.guard) <= slope.blur)) continue;
                 const bool stays = slope.rate == 0;
                 if (!stays && grazes(i, after, slope, after.t - last.flight_start)) continue;
-                const bool matters = stays || counts(i, slope.rate) || comes_from_before(i, before);
+                const bool matters = stays ? !is_on_surface(i, before)
+                                           : counts(i, slope.rate) || comes_from_before(i, before);
                 if (matters && !all_on_surface(i, after, slope.rate, last.dt)) return true;
             }
         }
@@ -461,10 +462,16 @@ private:
     [[nodiscard]] bool comes_from_before(std::size_t which, const Motion<X>& motion) const
     {
         if (!call_enabled_in(system(), which, motion.mode)) return false;
-        const Slope slope = slope_at(which, motion);
-        if (!(std::fabs(slope.guard) > slope.blur)) return false;
+        if (is_on_surface(which, motion)) return false;
         const Crossing crossing = guard_info_of<X>(system(), which).crossing;
-        return crossing == Crossing::either || (slope.guard > 0) == (crossing == Crossing::falling);
+        const double guard = linearization_.guard(which, motion.mode, motion.t, motion.x);
+        return crossing == Crossing::either || (guard > 0) == (crossing == Crossing::falling);
+    }
+
+    [[nodiscard]] bool is_on_surface(std::size_t which, const Motion<X>& motion) const
+    {
+        const Slope slope = slope_at(which, motion);
+        return std::fabs(slope.guard) <= slope.blur;
     }
 
     /// Whether neighbouring motions that are put here at an event that moves by dt are put on the
