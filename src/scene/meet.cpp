@@ -269,12 +269,14 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
     if (gap > reach_of(path)) return meeting;
     const auto located = [&](double after, double side) {
         const Departure from = side > 0 && on ? departure(gap, rounding) : Departure{};
-        return on_map(after, path.until, [&](double s) {
+        const auto at = [&](double s) {
             const Instant t = b.t.after(s);
             const Vector2 facing = side * normal;
             return GapAndRate{from.left_of(dot(world.position(i, t) - face.at, facing) - b.radius),
                               dot(world.velocity(i, t), facing)};
-        });
+        };
+        return on_map(after, path.until, at,
+                      [&](double s) { return side * (2 * c[2] + s * (6 * c[3] + 12 * s * c[4])); });
     };
     const double first =
         beside ? falls_again(c, 4, path.until) : falls_within(c, 4, path.until, closed);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "scene/motion.hpp"
 #include "scene/world.hpp"
@@ -58,9 +59,19 @@ template <class Pair>
     }
 }
 
-/// The root of a gap, corrected to the exact motion. `gap` returns the gap at a time and its rate.
-template <class Gap>
-[[nodiscard]] double on_map(double after, double until, const Gap& gap)
+/// The second derivative of a gap that is not known.
+struct UnknownBend {
+    double operator()(double /*s*/) const noexcept
+    {
+        return std::numeric_limits<double>::quiet_NaN();
+    }
+};
+
+/// The root of a gap, corrected to the exact motion. `gap` returns the gap at a time and its rate,
+/// `bend` the second derivative of the polynomial that it is close to: with it, the correction is
+/// of third order (Chebyshev's method).
+template <class Gap, class Bend = UnknownBend>
+[[nodiscard]] double on_map(double after, double until, const Gap& gap, const Bend& bend = {})
 {
     for (int i = 0; i < 3; ++i) {
         const auto [value, rate] = gap(after);
@@ -68,9 +79,17 @@ template <class Gap>
         const double change = -value / rate;
         // The map differs from the polynomial by the error of a step.
         if (std::fabs(change) > 0.1 * until) break;
-        after = std::clamp(after + change, 0.0, until);
+        const double second = -0.5 * bend(after) * change * change / rate;
+        const double part = change / after;
+        after += std::isnan(second) ? change : change + second;
+        after = std::clamp(after, 0.0, until);
         // Newton's method doubles the digits: the next change would be below rounding.
         if (std::fabs(change) <= 1e-9 * after) break;
+        // What Chebyshev's leaves is of third order, or from the difference in bend of two motions
+        // that are `value` apart, of the size of value / after^2.
+        const double left =
+            2 * second * second / std::fabs(change) + 10 * part * part * std::fabs(change);
+        if (left <= 0.25 * epsilon * after) break;
     }
     return after;
 }

@@ -13,12 +13,13 @@ struct Roots {
     void add(double s) { at[static_cast<std::size_t>(count++)] = s; }
 };
 
-/// The root between a and b, where the values fa and fb have opposite signs: Newton's method from
-/// where the secant ends, or halves where it leads outside.
-double root_between(const Polynomial& c, int degree, double a, double fa, double b, double fb)
+/// The root between a and b, where the values fa and fb have opposite signs: Newton's method from a
+/// guess, or from where the secant ends, or halves where it leads outside.
+double root_between(const Polynomial& c, int degree, double guess, double a, double fa, double b,
+                    double fb)
 {
     const double secant = a + (b - a) * (fa / (fa - fb));
-    double s = secant > a && secant < b ? secant : 0.5 * (a + b);
+    double s = guess > a && guess < b ? guess : secant > a && secant < b ? secant : 0.5 * (a + b);
     for (int i = 0; i < 200; ++i) {
         double f = c[static_cast<std::size_t>(degree)];
         double rate = 0;
@@ -48,7 +49,8 @@ bool is_monotone(const Polynomial& c, int degree, double until)
 }
 
 /// All roots in (0, until], from those of the derivative, between which the polynomial is monotone.
-Roots roots_in(const Polynomial& c, int degree, double until)
+/// `guess` may be near one of them.
+Roots roots_in(const Polynomial& c, int degree, double until, double guess = never)
 {
     Roots roots;
     while (degree > 0 && c[static_cast<std::size_t>(degree)] == 0) --degree;
@@ -67,7 +69,7 @@ Roots roots_in(const Polynomial& c, int degree, double until)
         const double to = k < turns.count ? turns.at[static_cast<std::size_t>(k)] : until;
         const double f_to = value_of(c, degree, to);
         if ((f_from > 0 && f_to <= 0) || (f_from < 0 && f_to >= 0)) {
-            roots.add(f_to == 0 ? to : root_between(c, degree, from, f_from, to, f_to));
+            roots.add(f_to == 0 ? to : root_between(c, degree, guess, from, f_from, to, f_to));
         }
         from = to;
         f_from = f_to;
@@ -105,7 +107,7 @@ double falls_within(Polynomial c, int degree, double until, double tolerance) no
     }
     if (degree == 0) return never;
     const double end = std::isfinite(until) ? until : bound_of_roots(c, degree);
-    const Roots roots = roots_in(c, degree, end);
+    const Roots roots = roots_in(c, degree, end, falls_after(c[0], c[1], 2 * c[2], 0));
     if (roots.count > 0) return roots.at[0];
     return never;
 }
