@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "clearing_gate.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/learn/certify.hpp"
 
@@ -241,30 +242,16 @@ TEST(Metered, EventsStayTheSameWhereEveryStepIsCheckedForAWhile)
         Shuttle{.loose = 4}, {.t_end = 50, .rtol = 1e-9, .atol = 1e-9, .h_max = 0.02});
 }
 
-/// A shaken body on a spring beside a wall, where an impact takes all of its speed.
-struct Plastic {
-    using State = X;
-    static constexpr std::string_view name = "shuttle";
-    void flow(double t, const X& x, X& dxdt) const
-    {
-        dxdt = {x[1], -0.7 * std::cos(2.7 * t) - x[0]};
-    }
-    double guard(double, const X& x) const { return x[0] - 0.5; }
-    void reset(double, X& x) const { x[1] = 0; }
-    double speed_bound(double, const X& x) const { return std::fabs(x[1]); }
-    double acceleration_bound(double, const X&) const { return 20; }
-};
-
 TEST(Metered, ImpactsThatTakeAllSpeedAreThoseOfTheExactDetector)
 {
-    // After an impact the body leaves its surface with the rate zero, on the side to which it is
-    // accelerated.
+    const test::PlasticOscillator system;
     const Options options{.t_end = 20, .step = 0.001};
-    const auto exact = integrate(Plastic{}, X{1, 0}, options, Fixed{});
+    const auto exact = integrate(system, X{1, 0}, options, Fixed{});
     EXPECT_EQ(exact.events.size(), 3U);
     for (const Decision decision : {Decision::every_step, Decision::always}) {
-        const Metered metered(Foreseen<>(horizon_gate(0.1), unchecked), {.decision = decision});
-        expect_same(exact, integrate(Plastic{}, X{1, 0}, options, Fixed{}, metered));
+        const Metered metered(Foreseen<>(test::clearing_gate(0.1), unchecked),
+                              {.decision = decision});
+        expect_same(exact, integrate(system, X{1, 0}, options, Fixed{}, metered));
     }
 }
 

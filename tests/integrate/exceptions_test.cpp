@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "clearing_gate.hpp"
 #include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
@@ -91,21 +92,6 @@ struct Bounded {
     }
     [[nodiscard]] double acceleration_bound(double, const State&) const { return 15; }
 };
-
-/// A gate that clears a tenth of a second in every state.
-gates::Gate clearing_gate()
-{
-    Model model;
-    model.kind = "gate-horizon";
-    model.recipe = "state";
-    model.offset = {0, 0};
-    model.scale = {1, 1};
-    model.domain = {{-100, 100}, {-100, 100}};
-    model.step_max = 1;
-    model.layers = {{2, 2, {0, 0, 0, 0}, {0, 0}}, {2, 1, {0, 0}, {0}}};
-    model.levels = {{.value = 0.1, .threshold = 1}};
-    return gates::Gate(model);
-}
 
 struct Finished {
     Outcome outcome{};
@@ -212,7 +198,7 @@ TEST(Exceptions, RunsThatDeferChecksGoOnWithTheSameBits)
         expect_same_whichever_call_throws<Bounded>(advance, detector);
         expect_same_whichever_call_throws<Bounded>(take, detector);
     };
-    const Foreseen<> foreseen(clearing_gate());
+    const Foreseen<> foreseen(test::clearing_gate(0.1));
     expect_same(Planned<>());
     expect_same(foreseen);
     expect_same(Metered(foreseen, {.decision = MeterOptions::Decision::every_step}));

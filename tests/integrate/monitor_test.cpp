@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "allocations.hpp"
+#include "clearing_gate.hpp"
 #include "refusal.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/gates.hpp"
@@ -661,37 +662,15 @@ TEST(Monitor, StepsThatNeedNoCheckNeedNotBeShown)
     EXPECT_THROW(monitor.skip_to(Instant{1e9}, host.x(), host.rate()), std::logic_error);
 }
 
-/// A shaken body on a spring beside a wall, where an impact takes all of its speed.
-struct Plastic {
-    using State = X;
-    void flow(double t, const X& x, X& dxdt) const
-    {
-        dxdt = {x[1], -0.7 * std::cos(2.7 * t) - x[0]};
-    }
-    double guard(double, const X& x) const { return x[0] - 0.5; }
-    void reset(double, X& x) const { x[1] = 0; }
-    double speed_bound(double, const X& x) const { return std::fabs(x[1]); }
-    double acceleration_bound(double, const X&) const { return 20; }
-};
-
 /// A detector whose gate clears a tenth of a second in every state.
 Metered<Foreseen<>> metered(MeterOptions::Decision decision)
 {
-    Model model;
-    model.kind = "gate-horizon";
-    model.recipe = "state";
-    model.offset = {0, 0};
-    model.scale = {1, 1};
-    model.domain = {{-100, 100}, {-100, 100}};
-    model.step_max = 1;
-    model.layers = {{2, 2, {0, 0, 0, 0}, {0, 0}}, {2, 1, {0, 0}, {0}}};
-    model.levels = {{.value = 0.1, .threshold = 1}};
-    return Metered(Foreseen<>(gates::Gate(model)), {.decision = decision});
+    return Metered(Foreseen<>(test::clearing_gate(0.1)), {.decision = decision});
 }
 
 TEST(Monitor, AMeteredGateChangesNothingWhicheverWayIsTaken)
 {
-    const Plastic system;
+    const test::PlasticOscillator system;
     EventMonitor plain(system, X{});
     const auto exact = drive(system, plain, X{1, 0}, 20, 0.05);
     ASSERT_EQ(exact.cuts.size(), 3u);

@@ -428,74 +428,19 @@ TEST(SensitivityThroughEvents, AGuardThatIsPutOnItsSurfaceFollowsIfAllNeighbours
     EXPECT_EQ(some.undefined_at->reason, Undefined::simultaneous);
 }
 
-/// At x = 0 y loses `rate` and begins to move; where it crosses zero, it is set to five.
+/// At x = 0 y loses `loss` and begins to move, or not; where it crosses zero, it is set to five.
 struct PutOnSurface {
     using State = X2;
     double rate = 1;  ///< of y from then on
+    double loss = 1;
     double keep = 1;
+    Crossing crossing = Crossing::falling;
     static constexpr std::size_t guard_count = 2;
 
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const
     {
-        return {.crossing = which == 1 ? Crossing::either : Crossing::falling};
+        return {.crossing = which == 1 ? crossing : Crossing::falling};
     }
-    template <class X>
-    void flow(double, const X& x, X& dxdt) const
-    {
-        dxdt[0] = -1;
-        dxdt[1] = x[0] > 5 ? rate : 0;
-    }
-    template <class X>
-    [[nodiscard]] double guard(std::size_t which, double, const X& x) const
-    {
-        return x[which];
-    }
-    template <class X>
-    void reset(std::size_t which, double, X& x) const
-    {
-        if (which == 0) {
-            x[0] = 10;
-            x[1] = keep * (x[1] - rate);
-        } else {
-            x[1] = 5;
-        }
-    }
-};
-
-// From y = rate the run is put on zero and leaves it; neighbours that are put before zero are set
-// to five. With keep = 0 all neighbours are put on the surface.
-TEST(SensitivityThroughEvents, AGuardThatIsPutOnItsSurfaceAndLeavesItEndsTheDerivatives)
-{
-    const Options options{.t_end = 1.5};
-    for (const double rate : {1.0, -1.0}) {
-        const PutOnSurface system{.rate = rate};
-        const auto at_zero = sensitivities(system, {1.0, rate}, {}, options);
-        ASSERT_EQ(at_zero.events.size(), 1u);
-        ASSERT_TRUE(at_zero.undefined_at) << rate;
-        EXPECT_EQ(at_zero.undefined_at->event, 0u);
-        EXPECT_EQ(at_zero.undefined_at->reason, Undefined::simultaneous);
-        EXPECT_NEAR(at_zero.events[0].dt[0], 1, 1e-12);
-        EXPECT_TRUE(std::isnan(at_zero.state(1, 1)));
-
-        const auto beyond = sensitivities(system, {1.0, 1.01 * rate}, {}, options);
-        EXPECT_FALSE(beyond.undefined_at);
-        EXPECT_NEAR(beyond.state(1, 1), 1, 1e-12);
-        const auto all =
-            sensitivities(PutOnSurface{.rate = rate, .keep = 0}, {1.0, rate}, {}, options);
-        EXPECT_FALSE(all.undefined_at);
-        EXPECT_NEAR(all.state(1, 0), -rate, 1e-12);
-    }
-}
-
-/// At x = 0 y loses something, and rises from then on, or not; where it falls below zero, it is set
-/// to five.
-struct CarriedToSurface {
-    using State = X2;
-    double rate = 1;  ///< of y from then on
-    double keep = 1;
-    double loss = 1;
-    static constexpr std::size_t guard_count = 2;
-
     template <class X>
     void flow(double, const X& x, X& dxdt) const
     {
@@ -519,13 +464,39 @@ struct CarriedToSurface {
     }
 };
 
+// From y = rate the run is put on zero and leaves it; neighbours that are put before zero are set
+// to five. With keep = 0 all neighbours are put on the surface.
+TEST(SensitivityThroughEvents, AGuardThatIsPutOnItsSurfaceAndLeavesItEndsTheDerivatives)
+{
+    const Options options{.t_end = 1.5};
+    for (const double rate : {1.0, -1.0}) {
+        const PutOnSurface system{.rate = rate, .loss = rate, .crossing = Crossing::either};
+        const auto at_zero = sensitivities(system, {1.0, rate}, {}, options);
+        ASSERT_EQ(at_zero.events.size(), 1u);
+        ASSERT_TRUE(at_zero.undefined_at) << rate;
+        EXPECT_EQ(at_zero.undefined_at->event, 0u);
+        EXPECT_EQ(at_zero.undefined_at->reason, Undefined::simultaneous);
+        EXPECT_NEAR(at_zero.events[0].dt[0], 1, 1e-12);
+        EXPECT_TRUE(std::isnan(at_zero.state(1, 1)));
+
+        const auto beyond = sensitivities(system, {1.0, 1.01 * rate}, {}, options);
+        EXPECT_FALSE(beyond.undefined_at);
+        EXPECT_NEAR(beyond.state(1, 1), 1, 1e-12);
+        PutOnSurface none = system;
+        none.keep = 0;
+        const auto all = sensitivities(none, {1.0, rate}, {}, options);
+        EXPECT_FALSE(all.undefined_at);
+        EXPECT_NEAR(all.state(1, 0), -rate, 1e-12);
+    }
+}
+
 // From y = 1 the run is put on zero and does not leave it downward; neighbours that are carried
 // below zero are set to five.
 TEST(SensitivityThroughEvents, AGuardThatIsCarriedOntoItsSurfaceEndsTheDerivatives)
 {
     const Options options{.t_end = 1.5};
     for (const double rate : {1.0, 0.0}) {
-        const CarriedToSurface system{.rate = rate};
+        const PutOnSurface system{.rate = rate};
         const auto at_zero = sensitivities(system, {1.0, 1.0}, {}, options);
         ASSERT_EQ(at_zero.events.size(), 1u);
         ASSERT_TRUE(at_zero.undefined_at) << rate;
@@ -537,13 +508,12 @@ TEST(SensitivityThroughEvents, AGuardThatIsCarriedOntoItsSurfaceEndsTheDerivativ
         EXPECT_FALSE(above.undefined_at);
         EXPECT_NEAR(above.state(1, 1), 1, 1e-12);
         const auto all =
-            sensitivities(CarriedToSurface{.rate = rate, .keep = 0}, {1.0, 1.0}, {}, options);
+            sensitivities(PutOnSurface{.rate = rate, .keep = 0}, {1.0, 1.0}, {}, options);
         EXPECT_FALSE(all.undefined_at);
         EXPECT_NEAR(all.state(1, 0), -rate, 1e-12);
     }
     // A guard that stays on its surface, as it did before, is not put there.
-    const auto still =
-        sensitivities(CarriedToSurface{.rate = 0, .loss = 0}, {1.0, 0.0}, {}, options);
+    const auto still = sensitivities(PutOnSurface{.rate = 0, .loss = 0}, {1.0, 0.0}, {}, options);
     EXPECT_FALSE(still.undefined_at);
     EXPECT_NEAR(still.state(1, 1), 1, 1e-12);
 }
