@@ -271,6 +271,7 @@ private:
     }
     [[gnu::noinline]] void copy_to_mark();
     void go_back_to_mark();
+    void rewind_counts(const Mark& mark, std::uint64_t steps, std::uint64_t rejected);
 
     /// Keeps the state before a step that ends at a time event, or that needs further evaluations
     /// to be recorded.

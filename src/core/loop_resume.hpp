@@ -77,6 +77,21 @@ void Loop<X, single>::copy_to_mark()
     mark_->everything = true;
 }
 
+/// Takes back all counts since the mark but those of calls, which have been made.
+template <class X, bool single>
+void Loop<X, single>::rewind_counts(const Mark& mark, std::uint64_t steps, std::uint64_t rejected)
+{
+    if (mark.everything || defers_) {
+        const Statistics seen = std::exchange(run_.statistics, mark.counts);
+        run_.statistics.guard_calls = seen.guard_calls;
+        run_.statistics.network_calls = seen.network_calls;
+        run_.statistics.bound_calls = seen.bound_calls;
+    }
+    run_.statistics.rejected = rejected;
+    run_.statistics.steps = steps;
+    search_.disabled = mark.disabled;
+}
+
 template <class X, bool single>
 void Loop<X, single>::go_back_to_mark()
 {
@@ -117,14 +132,7 @@ void Loop<X, single>::go_back_to_mark()
         replans_ = true;
         watching_ = false;
     }
-    if (mark.everything || defers_) {
-        const Statistics seen = std::exchange(run_.statistics, mark.counts);
-        run_.statistics.guard_calls = seen.guard_calls;
-        run_.statistics.network_calls = seen.network_calls;
-        run_.statistics.bound_calls = seen.bound_calls;
-    }
-    run_.statistics.rejected = rejected;
-    run_.statistics.steps = steps;
+    rewind_counts(mark, steps, rejected);
     run_.events.resize(mark.events);
     run_.trajectory.t.resize(samples);
     run_.trajectory.x.resize(samples);
@@ -132,7 +140,6 @@ void Loop<X, single>::go_back_to_mark()
     run_.outcome = Outcome::reached_end;
     this->forget_cause();
     next_sample_ = mark.next_sample;
-    search_.disabled = mark.disabled;
     ended_ = false;
     pending_ = Engine::Pending::nothing;
     if (guarded_) {
