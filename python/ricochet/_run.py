@@ -130,6 +130,10 @@ def integrate(system, x0, t_end, **options):
     If a function of the system raises an exception, it is passed on unchanged, with the `Run` so
     far as its attribute ``ricochet_run``.
     """
+    if isinstance(system, Ready):
+        run = _ricochet.integrate_plain(system._source, x0, t_end, options)
+        if run is not None:
+            return run
     source, x0, options, modes = prepare(system, x0, t_end, options)
     return _ricochet.integrate(source, x0, options, modes)
 

@@ -518,3 +518,28 @@ def test_a_rate_that_is_not_finite_on_the_surface_is_replaced_by_a_difference(ra
         run = ricochet.integrate(system, [0.0, 5.0], 2.0)
     assert run.outcome == "reached_end"
     np.testing.assert_allclose(run.events["t"], [10 / 9.81, 18 / 9.81], rtol=1e-9)
+
+
+@pytest.mark.parametrize("options", [{}, {"rtol": 1e-6}, {"max_steps": 7}, {"check_inside": False},
+                                     {"t_start": 0.5, "h_max": 0.25}, {"stop_at_event": True},
+                                     {"component_atol": 1.0}, {"atol": "x"}, {"rtol": -1.0},
+                                     {"mode": 1.0}, {"gate": 1.0}, {"record_steps": True},
+                                     {"sample_times": 1.0}, {"heigth": 1.0}])
+def test_plain_numbers_and_arrays_give_the_same_run(options):
+    """Ready systems have a shorter way for arguments that are numbers of Python."""
+    def run_from(x0, t_end):
+        try:
+            return ricochet.integrate(ricochet.BouncingBall(), x0, t_end, **options)
+        except (TypeError, ValueError) as error:
+            return error
+
+    plain = run_from((10.0, 0.0), 20.5)
+    other = run_from(np.array([10.0, 0.0]), np.float64(20.5))
+    assert type(plain) is type(other)
+    if isinstance(plain, Exception):
+        assert str(plain) == str(other)
+        return
+    assert plain.outcome == other.outcome and plain.t == other.t
+    assert np.array_equal(plain.x, other.x) and np.array_equal(plain.times, other.times)
+    assert plain.events.tobytes() == other.events.tobytes()
+    assert plain.statistics.steps == other.statistics.steps

@@ -128,27 +128,29 @@ Request request_from(const py::dict& given)
 {
     Request request;
     for (const auto& [key, value] : given) {
-        const auto name = py::cast<std::string>(key);
+        const auto name = py::cast<std::string_view>(key);
         const auto setter = setters().find(name);
         if (setter == setters().end()) {
             std::string known;
             for (const std::string& option : option_names()) {
                 known += (known.empty() ? "" : ", ") + option;
             }
-            throw py::type_error("found an option '" + name + "', expected some of " + known);
+            throw py::type_error("found an option '" + std::string(name) + "', expected some of " +
+                                 known);
         }
         if (PyComplex_Check(value.ptr())) {  // NumPy's, too, whose imaginary part would be lost
-            throw py::type_error(name + ": found " + py::cast<std::string>(py::repr(value)) +
+            throw py::type_error(std::string(name) + ": found " +
+                                 py::cast<std::string>(py::repr(value)) +
                                  ", expected no complex number");
         }
         try {
             setter->second(request, value);
         } catch (const py::cast_error&) {
             throw py::type_error(
-                name + ": found " + py::cast<std::string>(py::repr(value)) + ", a " +
+                std::string(name) + ": found " + py::cast<std::string>(py::repr(value)) + ", a " +
                 py::cast<std::string>(py::str(py::type::of(value).attr("__name__"))));
         } catch (const py::value_error& error) {
-            throw py::value_error(name + ": " + error.what());
+            throw py::value_error(std::string(name) + ": " + error.what());
         }
     }
     return request;

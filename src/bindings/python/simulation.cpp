@@ -2,6 +2,8 @@
 
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <array>
 #include <atomic>
 #include <memory>
 #include <optional>
@@ -76,11 +78,9 @@ void work_freely(bool freely, const Work& work)
     return record;
 }
 
-PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py::dict& given,
-                const py::object& mode_names)
+PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& request,
+             const py::object& mode_names)
 {
-    Request request = request_from(given);
-    if (!given.contains("mode")) request.options.mode = source->start_mode();
     PyRun out{
         .record = {}, .modes = modes_of(*source, mode_names), .guard_names = source->guard_names()};
 
@@ -112,6 +112,64 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
     out.record = record_of(loop->finish(), kept);
     if (door->watch().raised()) raise_with(*door->watch().raised(), std::move(out));
     return out;
+}
+
+PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py::dict& given,
+                const py::object& mode_names)
+{
+    Request request = request_from(given);
+    if (!given.contains("mode")) request.options.mode = source->start_mode();
+    return run_of(source, x0, std::move(request), mode_names);
+}
+
+[[nodiscard]] bool is_plain_number(const py::handle& value)
+{
+    return PyFloat_CheckExact(value.ptr()) || PyLong_CheckExact(value.ptr()) ||
+           PyBool_Check(value.ptr());
+}
+
+/// Whether `integrate` in Python would pass these options on as they are.
+[[nodiscard]] bool are_plain_options(const py::dict& given)
+{
+    // Names in a call are interned, and so are these, which Python translates.
+    static const std::array<PyObject*, 5> translated{
+        PyUnicode_InternFromString("mode"), PyUnicode_InternFromString("gate"),
+        PyUnicode_InternFromString("sample_times"), PyUnicode_InternFromString("record_steps"),
+        PyUnicode_InternFromString("t_end")};
+    for (const auto& [key, value] : given) {
+        if (!PyUnicode_CHECK_INTERNED(key.ptr()) || !is_plain_number(value)) return false;
+        if (std::ranges::find(translated, key.ptr()) != translated.end()) return false;
+    }
+    return true;
+}
+
+/// The start, if it is a list or tuple of Python's floats, or else nothing.
+[[nodiscard]] State plain_start(PyObject* x0)
+{
+    if (!PyTuple_CheckExact(x0) && !PyList_CheckExact(x0)) return {};
+    const auto count = static_cast<std::size_t>(PySequence_Fast_GET_SIZE(x0));
+    PyObject** const items = PySequence_Fast_ITEMS(x0);
+    State start(count);
+    for (std::size_t i = 0; i < count; ++i) {
+        if (!PyFloat_CheckExact(items[i])) return {};
+        start[i] = PyFloat_AS_DOUBLE(items[i]);
+    }
+    return start;
+}
+
+/// A run of a ready system whose arguments are numbers, without a translation in Python;
+/// None if they are not. A short run takes no longer than the translation.
+py::object integrate_plain(const std::shared_ptr<Source>& source, const py::object& x0,
+                           const py::object& t_end, const py::dict& options)
+{
+    const State start = plain_start(x0.ptr());
+    if (start.empty() || !PyFloat_CheckExact(t_end.ptr()) || !are_plain_options(options)) {
+        return py::none();
+    }
+    Request request = request_from(options);
+    request.options.t_end = PyFloat_AS_DOUBLE(t_end.ptr());
+    request.options.mode = source->start_mode();
+    return py::cast(run_of(source, start, std::move(request), py::none()));
 }
 
 /// A run driven by the caller. Not for two threads at a time.
@@ -250,6 +308,7 @@ private:
 void bind_runs(py::module_& module)
 {
     module.def("integrate", &integrate);
+    module.def("integrate_plain", &integrate_plain);
     module.def("option_names", &option_names);
     py::class_<PySimulation>(module, "Simulation")
         .def(py::init<std::shared_ptr<Source>, const State&, const py::dict&, const py::object&>())
