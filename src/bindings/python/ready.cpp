@@ -30,7 +30,12 @@ struct Watched : System {
     static constexpr bool unchecked_names = true;
 
     constexpr Watched() = default;  // needed by Taylor's method to read the operations
-    Watched(const System& system, SignalWatch& watch) : System(system), watch_(&watch) {}
+    Watched(const System& system, std::string_view name_of, SignalWatch& watch)
+        : System(system), name(name_of), watch_(&watch)
+    {
+    }
+
+    std::string_view name;  ///< both friction oscillators are `FrictionOscillator` here
 
     template <class... Arguments>
     requires requires(const System& system, const Arguments&... arguments)
@@ -51,7 +56,10 @@ private:
 template <class System, class Method>
 class ReadyDoor final : public RunDoor {
 public:
-    explicit ReadyDoor(const System& system) : system_(system, watch_), door_(system_, State{}) {}
+    ReadyDoor(const System& system, std::string_view name)
+        : system_(system, name, watch_), door_(system_, State{})
+    {
+    }
 
     void step_by_series(detail::RunSetup<State>& setup) override
     {
@@ -77,18 +85,17 @@ private:
     detail::StepperDoor<Watched<System>, State, Method> door_;
 };
 
-/// A whole run by the loop for `System`. Both friction oscillators share one.
+/// A whole run by the loop for `System`.
 template <class System, class Method>
-Record run_by(const Method& method, const System& system, const State& x0, const Request& request,
-              SignalWatch& watch)
+Record run_by(const Method& method, const Watched<System>& system, const State& x0,
+              const Request& request)
 {
     using X = typename System::State;
     using Stepping = ErrorControlled<Method>;
     X start;
     std::copy_n(x0.begin(), start.size(), start.begin());
-    const Watched<System> watched(system, watch);
     detail::PartsOfRun<Watched<System>, X, Stepping, Extremum, Newton> parts(
-        watched, start, Stepping{method}, Extremum{}, Newton{});
+        system, start, Stepping{method}, Extremum{}, Newton{});
     return record_of(detail::run_whole(parts.setup(), detail::core_state(start), request.options));
 }
 
@@ -106,14 +113,15 @@ public:
     [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override
     {
         require_size(x0);
-        return std::make_unique<ReadyDoor<System, MethodByName>>(system_);
+        return std::make_unique<ReadyDoor<Driven, MethodByName>>(system_, System::name);
     }
 
     [[nodiscard]] std::unique_ptr<RunDoor> open_by_series(const State& x0) const override
     {
         require_size(x0);
         constexpr std::size_t components = detail::fixed_size<X>();
-        return std::make_unique<ReadyDoor<System, detail::TaylorOf<components>>>(system_);
+        return std::make_unique<ReadyDoor<Driven, detail::TaylorOf<components>>>(system_,
+                                                                                 System::name);
     }
 
     [[nodiscard]] std::optional<Record> run_whole(const State& x0, const Request& request,
@@ -121,11 +129,9 @@ public:
     {
         if (!request.is_plain()) return std::nullopt;
         require_size(x0);
-        const Driven& driven = system_;
-        if (request.method == MethodName::dopri5) {
-            return run_by(Dopri5{}, driven, x0, request, watch);
-        }
-        return run_by(MethodByName{request.method}, driven, x0, request, watch);
+        const Watched<Driven> watched(system_, System::name, watch);
+        if (request.method == MethodName::dopri5) return run_by(Dopri5{}, watched, x0, request);
+        return run_by(MethodByName{request.method}, watched, x0, request);
     }
 
     [[nodiscard]] std::vector<std::string> mode_names() const override
