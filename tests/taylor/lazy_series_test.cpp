@@ -103,6 +103,34 @@ TEST(LazySeries, ABranchOnAParameterIsThatOfTheObject)
     EXPECT_FALSE(damped.as_compiled());
 }
 
+/// Sixteen pendulums in a chain: more operations than the compiler unrolls.
+struct Chain {
+    static constexpr std::size_t n = 32;
+    using State = std::array<double, n>;
+    template <class S>
+    constexpr void flow(const S& /*t*/, const std::array<S, n>& x, std::array<S, n>& dxdt) const
+    {
+        using std::exp, std::sin;
+        for (std::size_t i = 0; i < n; i += 2) {
+            const S before = x[(i + n - 2) % n] - x[i], after = x[(i + 2) % n] - x[i];
+            dxdt[i] = x[i + 1];
+            dxdt[i + 1] = exp(after) - exp(-before) - 2.0 * sin(x[i]) + 0.1 * x[i] * x[i + 1];
+        }
+    }
+};
+
+TEST(LazySeries, FlowsOfMoreOperationsThanAreCompiledAgreeWithFehlberg78)
+{
+    EXPECT_FALSE((detail::StepperDoor<Chain, Chain::State, Taylor>(Chain{}, {}).as_compiled()));
+    Chain::State start{};
+    for (std::size_t i = 0; i < Chain::n; i += 2) start[i] = 0.1 * std::sin(static_cast<double>(i));
+    const Options options{.t_end = 5, .rtol = 1e-13, .atol = 1e-13};
+    const auto run = integrate(Chain{}, start, options, ByTaylor{});
+    const auto other = integrate(Chain{}, start, options, ErrorControlled<Fehlberg78>{});
+    // 1e-13 in each of some hundred steps, which the motion does not amplify much in 5 s.
+    for (std::size_t i = 0; i < Chain::n; ++i) EXPECT_NEAR(run.x[i], other.x[i], 1e-10) << i;
+}
+
 /// Oscillators in a row, beside each other, as many as there are frequencies.
 struct Row {
     using State = Vector;

@@ -36,16 +36,17 @@ template <bool unrolled, class System, std::size_t n>
     return out;
 }
 
-/// The same from operations that are recorded at run time.
+/// The same from operations that are recorded at run time, of which there may be so many.
 template <class System, std::size_t n>
 [[nodiscard]] std::array<std::array<double, n>, order + 1> lazy_series_of(
-    const System& system, double t, const std::array<double, n>& x)
+    const System& system, double t, const std::array<double, n>& x,
+    std::size_t most = std::numeric_limits<std::size_t>::max())
 {
     detail::Recording recording;
     std::vector<int> outputs(n);
     record_into(system, 0, recording, std::array<detail::Recorded, n>{}, outputs);
     detail::LazyTape tape(n, recording, outputs);
-    EXPECT_LE(tape.operations(), (taylor_tape<System, n, 0>.ops.size() - n - 1));
+    EXPECT_LE(tape.operations(), most);
     std::array<std::array<double, n>, order + 1> out{};
     EXPECT_EQ(tape.compute(t, x.data(), {order, out[0].data(), nullptr}), order);
     return out;
@@ -60,7 +61,7 @@ void expect_reference_series(const System& system, double t, const std::array<do
     const auto expected = reference_series<order>(system, t, x);
     const auto unrolled = series_of<true>(system, t, x);
     const auto looped = series_of<false>(system, t, x);
-    const auto lazy = lazy_series_of(system, t, x);
+    const auto lazy = lazy_series_of(system, t, x, taylor_tape<System, n, 0>.ops.size() - n - 1);
     for (int k = 0; k <= order; ++k) {
         const auto row = static_cast<std::size_t>(k);
         double largest = 0;
@@ -143,6 +144,59 @@ TEST(TaylorSeries, CoefficientsOfEveryFunctionAgreeWithComposedSeriesInLongDoubl
     expect_reference_series(Exponential{}, 0.3, Two{0.6, 0.2});
     expect_reference_series(Algebraic{}, 0, Two{0.5, 0.8});
     expect_reference_series(Inverse{}, 0, Two{0.5, 1.3});
+}
+
+/// The same flow for each pair of components.
+template <class Flow, std::size_t pairs>
+struct Repeated {
+    template <class S>
+    void flow(const S& t, const std::array<S, 2 * pairs>& x, std::array<S, 2 * pairs>& dxdt) const
+    {
+        for (std::size_t p = 0; p < pairs; ++p) {
+            const std::array<S, 2> own{x[2 * p], x[2 * p + 1]};
+            std::array<S, 2> rate{};
+            Flow{}.flow(t, own, rate);
+            dxdt[2 * p] = rate[0];
+            dxdt[2 * p + 1] = rate[1];
+        }
+    }
+};
+
+template <class Flow, std::size_t pairs>
+void expect_bits_side_by_side()
+{
+    std::array<double, 2 * pairs> x{};
+    for (std::size_t p = 0; p < pairs; ++p) {
+        x[2 * p] = 0.4 + 0.05 * static_cast<double>(p);
+        x[2 * p + 1] = 1.3 - 0.07 * static_cast<double>(p);
+    }
+    const auto together = lazy_series_of(Repeated<Flow, pairs>{}, 0.3, x);
+    for (std::size_t p = 0; p < pairs; ++p) {
+        const auto alone = lazy_series_of(Repeated<Flow, 1>{}, 0.3, Two{x[2 * p], x[2 * p + 1]});
+        for (std::size_t k = 0; k <= order; ++k) {
+            EXPECT_EQ(together[k][2 * p], alone[k][0]) << pairs << " pairs, " << p << ", k = " << k;
+            EXPECT_EQ(together[k][2 * p + 1], alone[k][1]) << pairs << ", " << p << ", k = " << k;
+        }
+    }
+}
+
+template <class Flow>
+void expect_bits_in_any_number()
+{
+    expect_bits_side_by_side<Flow, 2>();
+    expect_bits_side_by_side<Flow, 3>();
+    expect_bits_side_by_side<Flow, 5>();
+    expect_bits_side_by_side<Flow, 8>();
+    expect_bits_side_by_side<Flow, 13>();
+}
+
+TEST(TaylorSeries, RecordedOperationsHaveTheSameBitsSideBySide)
+{
+    expect_bits_in_any_number<Trigonometric>();
+    expect_bits_in_any_number<Exponential>();
+    expect_bits_in_any_number<Algebraic>();
+    expect_bits_in_any_number<Inverse>();
+    expect_bits_in_any_number<Angles>();
 }
 
 struct Oscillator {

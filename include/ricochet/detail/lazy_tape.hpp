@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "ricochet/detail/taylor_recording.hpp"
@@ -15,7 +16,8 @@ namespace ricochet::detail {
 
 /// The operations of a flow and of its guards in one mode, with the constants of one object.
 ///
-/// Recurrences are those of `TaylorSeries`, with which the results agree to rounding.
+/// Recurrences are those of `TaylorSeries`, with which the results agree to rounding. Operations of
+/// one kind that do not depend on each other are computed side by side.
 class LazyTape {
 public:
     LazyTape() = default;
@@ -38,8 +40,6 @@ public:
     int compute(double t, const double* x, const TaylorCoefficients<double>& to);
 
 private:
-    static constexpr std::size_t width = most_taylor_order + 1;
-
     /// As in `TaylorTape`.
     struct Tape {
         std::size_t states = 0;
@@ -51,31 +51,67 @@ private:
         std::vector<int> degree;
     };
 
+    /// What is computed side by side: coefficient k of operations of one kind.
+    enum class Pass {
+        operation,
+        copy,   ///< of operands that do not stand side by side
+        slope,  ///< k times a coefficient
+    };
+    /// Places of the operands.
+    struct Lane {
+        std::uint32_t a, b;
+    };
+    struct Batch {
+        Pass pass = Pass::operation;
+        TaylorOp op{};
+        double exponent = 0;
+        int degree_a = 0, degree_b = 0, degree_c = 0;  ///< of the operands
+        int degree = 0;
+        bool for_guards = false;
+        std::size_t first = 0;           ///< place of the first lane
+        std::vector<std::size_t> ops{};  ///< their numbers on the tape
+        std::vector<Lane> lanes{};
+        /// Places of the first operands where those of all lanes stand side by side, and of the
+        /// slopes of the operands and of the results.
+        std::size_t a = 0, b = 0, c = 0, slope_a = 0, slope_b = 0, slope = 0;
+    };
+    /// The terms j = lo, ..., hi of coefficient k.
+    struct Terms {
+        int k, lo, hi;
+    };
+
     void simplify(const Recording& recording);
     [[nodiscard]] int repeated(TapeOp& op, double& constant) const;
     void add_partners();
-    void find_slopes();
-    void start();
-    void compute_at(std::size_t i, int k);
+
+    void arrange();
+    [[nodiscard]] static Lane lane(std::size_t a, std::size_t b) noexcept;
+    [[nodiscard]] std::vector<Batch> batches() const;
+    void place(Batch& batch);
+    void side_by_side(Batch& batch);
+    [[nodiscard]] std::size_t in_a_row(const std::vector<std::size_t>& places, bool late);
+    [[nodiscard]] std::size_t slopes_of(std::size_t first, std::size_t count, bool late);
+
+    void start(double t, const double* x);
+    [[nodiscard]] double begin(std::size_t i);
+    void compute_row(int k, bool guards_alone);
+    void compute_batch(const Batch& batch, int k);
+    void add_up(const Batch& batch, int k);
+    void add_up_function(const Batch& batch, int k);
+    void add_up_inverse(const Batch& batch, int k);
+    void convolve(std::size_t a, std::size_t b, Terms terms, std::size_t count, double* sums);
+    void square(std::size_t a, int k, int lo, std::size_t count);
+    void power(const Batch& batch, int k, int hi);
     void advance(int k, double* out, double* guards);
     void keep_guards(int k, double* guards) const;
-    [[nodiscard]] double begin(std::size_t i);
-    [[nodiscard]] double coefficient(std::size_t i, int k) const;
-    [[nodiscard]] double coefficient_of_function(std::size_t i, int k) const;
-    [[nodiscard]] double coefficient_of_inverse(std::size_t i, int k) const;
 
-    [[nodiscard]] double* series(int i) noexcept
+    [[nodiscard]] double* row(int k) noexcept
     {
-        return coefficients_.data() + static_cast<std::size_t>(i) * width;
+        return rows_.data() + static_cast<std::size_t>(k) * width_;
     }
-    [[nodiscard]] const double* series(int i) const noexcept
+    [[nodiscard]] const double* row(int k) const noexcept
     {
-        return coefficients_.data() + static_cast<std::size_t>(i) * width;
-    }
-    /// j times coefficient j
-    [[nodiscard]] const double* slope(int i) const noexcept
-    {
-        return slopes_.data() + static_cast<std::size_t>(i) * width;
+        return rows_.data() + static_cast<std::size_t>(k) * width_;
     }
     [[nodiscard]] int degree(int i) const noexcept
     {
@@ -84,8 +120,15 @@ private:
 
     Tape tape_;
     std::vector<double> constants_;
-    std::vector<double> coefficients_, slopes_, inverses_;
-    std::vector<bool> has_slope_;
+    std::vector<std::size_t> places_;   ///< of operations in a row
+    std::vector<std::size_t> outputs_;  ///< places of the outputs
+    std::vector<Batch> batches_;        ///< in their order
+    std::vector<Batch> late_;           ///< of what a row is read from in the next ones alone
+    std::size_t width_ = 0;
+    std::vector<double> rows_;      ///< a row of coefficients for each order
+    std::vector<double> factors_;   ///< constants by place
+    std::vector<double> inverses_;  ///< by place
+    std::vector<double> sums_, other_sums_;
     int degree_ = no_degree;
     bool finite_ = true;
 };

@@ -78,6 +78,19 @@ template <class System, std::size_t n>
     }
 }
 
+/// The largest number of operations in these modes, with the inputs.
+template <class System, std::size_t n, std::size_t... mode>
+[[nodiscard]] constexpr std::size_t most_operations(std::index_sequence<mode...>) noexcept
+{
+    return std::max(
+        {std::size_t{0}, taylor_tape<System, n, static_cast<Mode>(mode)>.ops.size()...});
+}
+
+/// With more operations than this the code of one step no longer fits into the caches of a
+/// processor, and takes longer than operations that are recorded (measured with up to six bodies
+/// that attract each other).
+inline constexpr std::size_t most_compiled_ops = 200;
+
 /// The number of guards with series of their own, where the size of the state is known.
 template <class System, std::size_t n>
 [[nodiscard]] constexpr std::size_t guards_with_series() noexcept
@@ -120,16 +133,22 @@ struct TaylorSizes<System, X, 0> {
 
 /// A door with the operations of the flow and the current step.
 ///
-/// Operations that the compiler has read are unrolled by it. Where it cannot read them, or where
-/// the operations of the object differ from those of an object that is constructed by default, they
-/// are recorded here, once for each mode, and executed one by one.
+/// Operations that the compiler has read are unrolled by it. Where it cannot read them, where there
+/// are too many, or where those of the object differ from those of an object that is constructed by
+/// default, they are recorded here, once for each mode, and executed kind by kind.
 template <class System, class X, std::size_t n>
 struct TaylorDoor : Door<System, X> {
     using Sizes = TaylorSizes<System, X, n>;
     using Step = typename Sizes::Step;
     using Room = typename Sizes::Room;
     static constexpr bool on_series = Sizes::on_series;
-    static constexpr bool is_constant = ConstantFlow<System, n>;
+    static constexpr bool is_constant = [] {
+        if constexpr (ConstantFlow<System, n>) {
+            return most_operations<System, n>(
+                       std::make_index_sequence<tape_count<System, n>()>{}) <= most_compiled_ops;
+        }
+        return false;
+    }();
     static constexpr bool takes_series = [] {
         constexpr bool of_arrays = ScalarFlow<System, n> || ModedScalarFlow<System, n>;
         constexpr bool of_vectors = VectorFlow<System>;
@@ -214,7 +233,7 @@ struct TaylorDoor : Door<System, X> {
     [[no_unique_address]] std::conditional_t<n == 0, Room, std::tuple<>> room;
 
 private:
-    static constexpr std::size_t tapes = tape_count<System, n>();
+    static constexpr std::size_t tapes = is_constant ? tape_count<System, n>() : 0;
     static constexpr bool moded = [] {
         if constexpr (n > 0) return ModedScalarFlow<System, n>;
         return requires(const System& system, Mode mode, const Recorded& t,
@@ -271,12 +290,7 @@ private:
     // --- operations that the compiler knows ---
 
     static constexpr std::size_t most_constants =
-        []<std::size_t... mode>(std::index_sequence<mode...>)
-    {
-        return std::max(
-            {std::size_t{0}, taylor_tape<System, n, static_cast<Mode>(mode)>.ops.size()...});
-    }
-    (std::make_index_sequence<tapes>{});
+        most_operations<System, n>(std::make_index_sequence<tapes>{});
 
     static constexpr auto polynomial_ = []<std::size_t... mode>(std::index_sequence<mode...>)
     {

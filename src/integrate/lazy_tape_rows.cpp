@@ -1,0 +1,535 @@
+// The coefficients of recorded operations: a row for each order, in which operations of one kind
+// stand side by side, so that the processor computes several at a time.
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detail/lazy_tape.hpp"
+#include "ricochet/detail/taylor_sums.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+/// Operations begin at even places, so that two are computed at a time.
+[[nodiscard]] std::size_t even(std::size_t place) noexcept
+{
+    return place + place % 2;
+}
+/// The largest number of terms in a sum.
+constexpr std::size_t most_terms = most_taylor_order + 1;
+
+struct SumOfRows {
+    int last;
+    std::size_t width;      ///< of a row
+    const double* weights;  ///< of the terms; null: 1
+};
+
+using Offsets = std::array<std::ptrdiff_t, most_terms>;
+
+/// Two doubles, of which the first has an even place.
+typedef double Pair __attribute__((vector_size(2 * sizeof(double)), may_alias));
+
+template <std::size_t pairs, bool weighted>
+[[gnu::always_inline]] inline void sum_block(const double* a, const double* b,
+                                             const Offsets& offsets, const SumOfRows& of,
+                                             double* sums)
+{
+    Pair sum[pairs];  // NOLINT(*-avoid-c-arrays): std::array would lose the attributes
+    const auto with_terms = [&](std::size_t i, const auto& put) {
+        const auto* const left = reinterpret_cast<const Pair*>(a + offsets[i]);
+        const auto* right = reinterpret_cast<const Pair*>(b - offsets[i]);
+        asm("" : "+r"(right));  // else g++ computes each address anew
+        for (std::size_t l = 0; l < pairs; ++l) {
+            put(sum[l], weighted ? of.weights[i] * left[l] * right[l] : left[l] * right[l]);
+        }
+    };
+    with_terms(0, [](Pair& to, Pair term) { to = term; });
+    for (std::size_t i = 1; i <= static_cast<std::size_t>(of.last); ++i) {
+        with_terms(i, [](Pair& to, Pair term) { to += term; });
+    }
+    for (std::size_t l = 0; l < pairs; ++l) reinterpret_cast<Pair*>(sums)[l] = sum[l];
+}
+
+/// In each lane the sum of weight_j a_j b_{-j} for j from 0 to `last`, added as by
+/// `reversed_product`.
+template <bool weighted>
+void sum_rows(const double* a, const double* b, const SumOfRows& of, std::size_t lanes,
+              double* sums)
+{
+    Offsets offsets;
+    for (int i = 0; i <= of.last; ++i) {
+        const int j = weighted ? i : outward(0, of.last, i);
+        offsets[static_cast<std::size_t>(i)] = j * static_cast<std::ptrdiff_t>(of.width);
+    }
+    const std::size_t pairs = (lanes + 1) / 2;
+    std::size_t l = 0;
+    for (; l + 8 <= 2 * pairs; l += 8) {
+        sum_block<4, weighted>(a + l, b + l, offsets, of, sums + l);
+    }
+    switch (pairs % 4) {
+        case 1: return sum_block<1, weighted>(a + l, b + l, offsets, of, sums + l);
+        case 2: return sum_block<2, weighted>(a + l, b + l, offsets, of, sums + l);
+        case 3: return sum_block<3, weighted>(a + l, b + l, offsets, of, sums + l);
+        default: return;
+    }
+}
+
+/// out_l = f(l), for places that are not among those that f reads
+template <class F>
+[[gnu::always_inline]] inline void fill(double* __restrict out, std::size_t count, const F& f)
+{
+#pragma GCC unroll 4
+    for (std::size_t l = 0; l < count; ++l) out[l] = f(l);
+}
+
+/// Whether a coefficient is a sum of products of coefficients, rather than linear in them.
+[[nodiscard]] bool is_linear(TaylorOp op) noexcept
+{
+    switch (op) {
+        case TaylorOp::input:
+        case TaylorOp::constant:
+        case TaylorOp::sum:
+        case TaylorOp::difference:
+        case TaylorOp::negative:
+        case TaylorOp::plus_constant:
+        case TaylorOp::minus_constant:
+        case TaylorOp::constant_minus:
+        case TaylorOp::times_constant:
+        case TaylorOp::over_constant: return true;
+        default: return false;
+    }
+}
+
+/// Functions g with g' = f(a) a' for another series f.
+[[nodiscard]] bool is_function(TaylorOp op) noexcept
+{
+    switch (op) {
+        case TaylorOp::exponential:
+        case TaylorOp::sine:
+        case TaylorOp::cosine:
+        case TaylorOp::hyperbolic_sine:
+        case TaylorOp::hyperbolic_cosine:
+        case TaylorOp::tangent:
+        case TaylorOp::hyperbolic_tangent: return true;
+        default: return false;
+    }
+}
+
+/// Functions g with f(a) g' = a'.
+[[nodiscard]] bool is_inverse(TaylorOp op) noexcept
+{
+    switch (op) {
+        case TaylorOp::logarithm:
+        case TaylorOp::arc_sine:
+        case TaylorOp::arc_cosine:
+        case TaylorOp::arc_tangent:
+        case TaylorOp::angle: return true;
+        default: return false;
+    }
+}
+
+}  // namespace
+
+// --- arrangement ---
+
+LazyTape::Lane LazyTape::lane(std::size_t a, std::size_t b) noexcept
+{
+    return {static_cast<std::uint32_t>(a), static_cast<std::uint32_t>(b)};
+}
+
+/// Operations of one kind, with operands of the same degrees, that depend on earlier ones alone.
+std::vector<LazyTape::Batch> LazyTape::batches() const
+{
+    using Kind = std::tuple<int, TaylorOp, std::uint64_t, int, int, int, int>;
+    std::map<Kind, Batch> kinds;
+    std::vector<int> levels(tape_.ops_count, 0);
+    for (std::size_t i = tape_.states + 1; i < tape_.ops_count; ++i) {
+        const TapeOp& op = tape_.ops[i];
+        for (const int operand : {op.a, op.b, op.c}) {
+            // Of sin and cos, each is an operand of the other.
+            if (operand < 0 || static_cast<std::size_t>(operand) >= i) continue;
+            levels[i] = std::max(levels[i], levels[static_cast<std::size_t>(operand)] + 1);
+        }
+        Batch& batch = kinds[{levels[i], op.op, std::bit_cast<std::uint64_t>(op.exponent),
+                              degree(op.a), degree(op.b), degree(op.c), tape_.degree[i]}];
+        batch.op = op.op;
+        batch.exponent = op.exponent;
+        batch.degree_a = degree(op.a);
+        batch.degree_b = degree(op.b);
+        batch.degree_c = degree(op.c);
+        batch.degree = tape_.degree[i];
+        batch.for_guards = batch.for_guards || tape_.for_guards[i];
+        batch.ops.push_back(i);
+    }
+    std::vector<Batch> out;
+    for (auto& [kind, batch] : kinds) out.push_back(std::move(batch));
+    return out;
+}
+
+void LazyTape::arrange()
+{
+    places_.assign(tape_.ops_count, 0);
+    for (std::size_t i = 0; i <= tape_.states; ++i) places_[i] = i;
+    width_ = even(tape_.states + 1);
+    std::vector<Batch> operations = batches();
+    for (Batch& batch : operations) place(batch);
+    for (Batch& batch : operations) {
+        const auto place_of = [&](int i) {
+            return places_[static_cast<std::size_t>(std::max(i, 0))];
+        };
+        for (const std::size_t i : batch.ops) {
+            batch.lanes.push_back(lane(place_of(tape_.ops[i].a), place_of(tape_.ops[i].b)));
+        }
+        if (!is_linear(batch.op)) side_by_side(batch);
+        if (is_inverse(batch.op)) batch.slope = slopes_of(batch.first, batch.ops.size(), true);
+        batches_.push_back(std::move(batch));
+    }
+    for (const int output : tape_.outputs) {
+        outputs_.push_back(places_[static_cast<std::size_t>(output)]);
+    }
+    rows_.assign((most_taylor_order + 1) * width_, 0);
+    inverses_.assign(width_, 0);
+    factors_.assign(width_, 0);
+    for (std::size_t i = 0; i < tape_.ops_count; ++i) factors_[places_[i]] = constants_[i];
+    sums_.assign(width_, 0);
+    other_sums_ = sums_;
+}
+
+/// Places a batch behind the others, by its operands, with room for a whole number of blocks.
+void LazyTape::place(Batch& batch)
+{
+    const auto operands = [&](std::size_t i) {
+        const auto place_of = [&](int operand) {
+            const auto at = static_cast<std::size_t>(operand);
+            return operand < 0 || at >= i ? 0 : places_[at];
+        };
+        return std::pair(place_of(tape_.ops[i].a), place_of(tape_.ops[i].b));
+    };
+    std::ranges::stable_sort(batch.ops, {}, operands);
+    batch.first = width_;
+    for (const std::size_t i : batch.ops) places_[i] = width_++;
+    width_ = even(width_);
+}
+
+/// Lets the operands of a batch stand side by side.
+void LazyTape::side_by_side(Batch& batch)
+{
+    const auto operand = [&](int TapeOp::*which) -> std::size_t {
+        std::vector<std::size_t> places;
+        bool late = false;
+        for (const std::size_t op : batch.ops) {
+            const int i = tape_.ops[op].*which;
+            if (i < 0) return 0;
+            places.push_back(places_[static_cast<std::size_t>(i)]);
+            late = late || places.back() >= batch.first;
+        }
+        return in_a_row(places, late);
+    };
+    batch.a = operand(&TapeOp::a);
+    batch.b = operand(&TapeOp::b);
+    batch.c = operand(&TapeOp::c);
+    const std::size_t count = batch.lanes.size();
+    if (is_function(batch.op) || batch.op == TaylorOp::angle) {
+        batch.slope_a = slopes_of(batch.a, count, false);
+    }
+    if (batch.op == TaylorOp::angle) batch.slope_b = slopes_of(batch.b, count, false);
+}
+
+/// The place of the first of these, or of the first of their copies.
+std::size_t LazyTape::in_a_row(const std::vector<std::size_t>& places, bool late)
+{
+    bool stand_so = places.front() % 2 == 0;
+    for (std::size_t l = 0; l < places.size(); ++l) {
+        stand_so = stand_so && places[l] == places.front() + l;
+    }
+    if (stand_so) return places.front();
+    Batch copies{.pass = Pass::copy, .degree = no_degree, .for_guards = true, .first = width_};
+    for (const std::size_t place : places) copies.lanes.push_back(lane(place, 0));
+    width_ += even(places.size());
+    (late ? late_ : batches_).push_back(copies);
+    return copies.first;
+}
+
+/// The place of the first slope of series that stand side by side.
+std::size_t LazyTape::slopes_of(std::size_t first, std::size_t count, bool late)
+{
+    Batch slopes{.pass = Pass::slope, .degree = no_degree, .for_guards = true, .first = width_};
+    for (std::size_t l = 0; l < count; ++l) slopes.lanes.push_back(lane(first + l, 0));
+    width_ += even(count);
+    (late ? late_ : batches_).push_back(slopes);
+    return slopes.first;
+}
+
+// --- computation ---
+
+int LazyTape::compute(double t, const double* x, const TaylorCoefficients<double>& to)
+{
+    const int order = is_polynomial() ? degree_ : to.order;
+    start(t, x);
+    std::copy_n(x, tape_.states, to.x);
+    advance(0, to.x, to.guards);
+    for (int k = 1; k < order; ++k) {
+        compute_row(k, false);
+        advance(k, to.x, to.guards);
+    }
+    if (tape_.guards > 0) {
+        compute_row(order, true);
+        keep_guards(order, to.guards);
+    }
+    return order;
+}
+
+/// Row 0, and the time.
+void LazyTape::start(double t, const double* x)
+{
+    const std::size_t n = tape_.states;
+    std::copy_n(x, n, row(0));
+    row(0)[n] = t;
+    row(1)[n] = 1;
+    for (const auto* passes : {&batches_, &late_}) {
+        for (const Batch& batch : *passes) {
+            const bool as_later = batch.pass == Pass::copy || batch.op == TaylorOp::sum ||
+                                  batch.op == TaylorOp::difference ||
+                                  batch.op == TaylorOp::times_constant;
+            if (as_later && batch.pass != Pass::slope) {
+                compute_batch(batch, 0);
+            } else {  // slopes have no operations, and are 0
+                for (const std::size_t i : batch.ops) row(0)[places_[i]] = begin(i);
+            }
+        }
+    }
+}
+
+void LazyTape::compute_row(int k, bool guards_alone)
+{
+    for (const auto* passes : {&batches_, &late_}) {
+        for (const Batch& batch : *passes) {
+            if (k > batch.degree || (guards_alone && !batch.for_guards)) continue;  // zeros
+            compute_batch(batch, k);
+        }
+    }
+}
+
+/// x_{k+1} = f_k / (k + 1)
+void LazyTape::advance(int k, double* out, double* guards)
+{
+    const std::size_t n = tape_.states;
+    const double* const from = row(k);
+    double* const to = row(k + 1);
+    for (std::size_t i = 0; i < n; ++i) to[i] = from[outputs_[i]];
+    for (std::size_t i = 0; i < n; ++i) to[i] /= k + 1;
+    std::copy_n(to, n, out + static_cast<std::size_t>(k + 1) * n);
+    keep_guards(k, guards);
+}
+
+void LazyTape::keep_guards(int k, double* guards) const
+{
+    const std::size_t m = tape_.guards;
+    for (std::size_t i = 0; i < m; ++i) {
+        guards[static_cast<std::size_t>(k) * m + i] = row(k)[outputs_[tape_.states + i]];
+    }
+}
+
+void LazyTape::compute_batch(const Batch& batch, int k)
+{
+    const double* const from = row(k);
+    const Lane* const lanes = batch.lanes.data();
+    const double* const factors = factors_.data() + batch.first;
+    const auto put = [&](const auto& f) { fill(row(k) + batch.first, batch.lanes.size(), f); };
+    const auto a = [=](std::size_t l) { return from[lanes[l].a]; };
+    const auto b = [=](std::size_t l) { return from[lanes[l].b]; };
+    if (batch.pass == Pass::slope) return put([=](std::size_t l) { return k * a(l); });
+    if (batch.pass == Pass::copy) return put(a);
+    switch (batch.op) {
+        case TaylorOp::input:
+        case TaylorOp::constant: return;
+        case TaylorOp::sum: return put([=](std::size_t l) { return a(l) + b(l); });
+        case TaylorOp::difference: return put([=](std::size_t l) { return a(l) - b(l); });
+        case TaylorOp::negative:
+        case TaylorOp::constant_minus: return put([=](std::size_t l) { return -a(l); });
+        case TaylorOp::plus_constant:
+        case TaylorOp::minus_constant: return put(a);
+        case TaylorOp::times_constant:
+        case TaylorOp::over_constant: return put([=](std::size_t l) { return factors[l] * a(l); });
+        default:
+            if (is_function(batch.op)) return add_up_function(batch, k);
+            if (is_inverse(batch.op)) return add_up_inverse(batch, k);
+            add_up(batch, k);
+    }
+}
+
+/// sum of a_j b_{k-j} for j from lo to hi, in each of `count` lanes
+void LazyTape::convolve(std::size_t a, std::size_t b, Terms terms, std::size_t count, double* sums)
+{
+    const auto& [k, lo, hi] = terms;
+    if (hi < lo) {
+        std::fill_n(sums, count, 0.0);
+        return;
+    }
+    sum_rows<false>(row(lo) + a, row(k - lo) + b, {hi - lo, width_, nullptr}, count, sums);
+}
+
+/// sum of a_j a_{k-j} for j from lo to k - lo
+void LazyTape::square(std::size_t a, int k, int lo, std::size_t count)
+{
+    convolve(a, a, {k, lo, (k - 1) / 2}, count, sums_.data());
+    const bool has_middle = k % 2 == 0 && lo <= k / 2;
+    const double* const middle = row(k / 2) + a;
+    for (std::size_t l = 0; l < count; ++l) {
+        const double twice = 2 * sums_[l];
+        sums_[l] = has_middle ? twice + middle[l] * middle[l] : twice;
+    }
+}
+
+/// sum of ((exponent + 1) j / k - 1) a_j p_{k-j} for j from 1 to hi, with the results p
+void LazyTape::power(const Batch& batch, int k, int hi)
+{
+    std::array<double, most_terms> weights{};
+    const double each = (batch.exponent + 1) / k;
+    for (int j = 1; j <= hi; ++j) weights[static_cast<std::size_t>(j - 1)] = each * j - 1;
+    if (hi < 1) {
+        std::ranges::fill(sums_, 0.0);
+        return;
+    }
+    sum_rows<true>(row(1) + batch.a, row(k - 1) + batch.first, {hi - 1, width_, weights.data()},
+                   batch.lanes.size(), sums_.data());
+}
+
+void LazyTape::add_up(const Batch& batch, int k)
+{
+    const std::size_t count = batch.lanes.size();
+    const std::size_t own = batch.first;
+    const double* const a = row(k) + batch.a;
+    double* const out = row(k) + own;
+    const int upto_a = std::min(batch.degree_a, k), upto_b = std::min(batch.degree_b, k);
+    const double* const inverses = inverses_.data() + own;
+    const auto scale = [&](const auto& numerator) {
+        for (std::size_t l = 0; l < count; ++l) {
+            out[l] = numerator(l) * inverses[l];
+        }
+    };
+    switch (batch.op) {
+        case TaylorOp::product:
+            return convolve(batch.a, batch.b, {k, std::max(0, k - batch.degree_b), upto_a}, count,
+                            out);
+        case TaylorOp::square:
+            square(batch.a, k, std::max(0, k - batch.degree_a), count);
+            std::copy_n(sums_.data(), count, out);
+            return;
+        case TaylorOp::quotient:
+            convolve(batch.b, own, {k, 1, upto_b}, count, sums_.data());
+            return scale([&](std::size_t l) { return a[l] - sums_[l]; });
+        case TaylorOp::constant_over:
+            convolve(batch.a, own, {k, 1, upto_a}, count, sums_.data());
+            return scale([&](std::size_t l) { return sums_[l]; });
+        case TaylorOp::square_root:
+            square(own, k, 1, count);
+            return scale([&](std::size_t l) { return a[l] - sums_[l]; });
+        default: power(batch, k, upto_a); return scale([&](std::size_t l) { return sums_[l]; });
+    }
+}
+
+/// Coefficients of functions g(a) with g' = f(a) a'.
+void LazyTape::add_up_function(const Batch& batch, int k)
+{
+    const std::size_t count = batch.lanes.size();
+    const std::size_t f = batch.op == TaylorOp::exponential ? batch.first : batch.b;
+    convolve(batch.slope_a, f, {k, 1, std::min(batch.degree_a, k)}, count, sums_.data());
+    const double* const a = row(k) + batch.a;
+    double* const out = row(k) + batch.first;
+    for (std::size_t l = 0; l < count; ++l) {
+        const double sum = sums_[l] / k;
+        switch (batch.op) {
+            case TaylorOp::cosine: out[l] = -sum; break;
+            case TaylorOp::tangent: out[l] = a[l] + sum; break;
+            case TaylorOp::hyperbolic_tangent: out[l] = a[l] - sum; break;
+            default: out[l] = sum;
+        }
+    }
+}
+
+/// Coefficients of functions g(a) with f(a) g' = a'.
+void LazyTape::add_up_inverse(const Batch& batch, int k)
+{
+    const std::size_t count = batch.lanes.size();
+    const int da = batch.degree_a, db = batch.degree_b;
+    const double* const inverses = inverses_.data() + batch.first;
+    const double* const a = row(k) + batch.a;
+    double* const out = row(k) + batch.first;
+    if (batch.op == TaylorOp::angle) {
+        // c g' = a' b - b' a
+        convolve(batch.slope_a, batch.b, {k, std::max(1, k - db), std::min(da, k)}, count,
+                 sums_.data());
+        convolve(batch.slope_b, batch.a, {k, std::max(1, k - da), std::min(db, k)}, count,
+                 other_sums_.data());
+        for (std::size_t l = 0; l < count; ++l) out[l] = sums_[l] - other_sums_[l];
+        convolve(batch.slope, batch.c, {k, std::max(1, k - batch.degree_c), k - 1}, count,
+                 sums_.data());
+        for (std::size_t l = 0; l < count; ++l) {
+            out[l] = (out[l] - sums_[l]) * inverses[l] / k;
+        }
+        return;
+    }
+    const bool of_a = batch.op == TaylorOp::logarithm;
+    const int from = std::max(1, k - (of_a ? da : db));
+    convolve(batch.slope, of_a ? batch.a : batch.b, {k, from, k - 1}, count, sums_.data());
+    const double sign = batch.op == TaylorOp::arc_cosine ? -1 : 1;
+    for (std::size_t l = 0; l < count; ++l) {
+        out[l] = (sign * a[l] - sums_[l] / k) * inverses[l];
+    }
+}
+
+/// Coefficient 0, and the factor of the later ones.
+double LazyTape::begin(std::size_t i)
+{
+    const TapeOp& op = tape_.ops[i];
+    const auto first = [&](int of) {
+        return of >= 0 ? row(0)[places_[static_cast<std::size_t>(of)]] : 0;
+    };
+    const double c = constants_[i];
+    const double a = first(op.a);
+    const double b = first(op.b);
+    double& inverse = inverses_[places_[i]];
+    switch (op.op) {
+        case TaylorOp::input: break;
+        case TaylorOp::constant: return c;
+        case TaylorOp::sum: return a + b;
+        case TaylorOp::difference: return a - b;
+        case TaylorOp::negative: return -a;
+        case TaylorOp::product: return a * b;
+        case TaylorOp::square: return a * a;
+        case TaylorOp::quotient: inverse = 1 / b; return a / b;
+        case TaylorOp::plus_constant: return a + c;
+        case TaylorOp::minus_constant: return a - c;
+        case TaylorOp::constant_minus: return c - a;
+        case TaylorOp::times_constant:
+        case TaylorOp::over_constant: return c * a;
+        case TaylorOp::constant_over: inverse = -1 / a; return c / a;
+        case TaylorOp::square_root: inverse = 0.5 / std::sqrt(a); return std::sqrt(a);
+        case TaylorOp::power: inverse = 1 / a; return std::pow(a, op.exponent);
+        case TaylorOp::cube_root: inverse = 1 / a; return std::cbrt(a);
+        case TaylorOp::exponential: return std::exp(a);
+        case TaylorOp::logarithm: inverse = 1 / a; return std::log(a);
+        case TaylorOp::sine: return std::sin(a);
+        case TaylorOp::cosine: return std::cos(a);
+        case TaylorOp::hyperbolic_sine: return std::sinh(a);
+        case TaylorOp::hyperbolic_cosine: return std::cosh(a);
+        case TaylorOp::tangent: return std::tan(a);
+        case TaylorOp::hyperbolic_tangent: return std::tanh(a);
+        case TaylorOp::arc_sine: inverse = 1 / b; return std::asin(a);
+        case TaylorOp::arc_cosine: inverse = 1 / b; return std::acos(a);
+        case TaylorOp::arc_tangent: inverse = 1 / b; return std::atan(a);
+        case TaylorOp::angle: inverse = 1 / first(op.c); return std::atan2(a, b);
+    }
+    return 0;
+}
+
+}  // namespace ricochet::detail
