@@ -26,58 +26,50 @@ namespace {
 /// The largest number of terms in a sum.
 constexpr std::size_t most_terms = most_taylor_order + 1;
 
-struct SumOfRows {
-    int last;
-    std::size_t width;      ///< of a row
-    const double* weights;  ///< of the terms; null: 1
-};
-
-using Offsets = std::array<std::ptrdiff_t, most_terms>;
-
 /// Two doubles, of which the first has an even place.
 typedef double Pair __attribute__((vector_size(2 * sizeof(double)), may_alias));
 
+/// The terms of a sum: j times the width of a row for each, and their factors if there are any.
+struct TermsOfRows {
+    std::size_t count;
+    const std::ptrdiff_t* offsets;
+    const double* weights;
+};
+
 template <std::size_t pairs, bool weighted>
 [[gnu::always_inline]] inline void sum_block(const double* a, const double* b,
-                                             const Offsets& offsets, const SumOfRows& of,
-                                             double* sums)
+                                             const TermsOfRows& terms, double* sums)
 {
     Pair sum[pairs];  // NOLINT(*-avoid-c-arrays): std::array would lose the attributes
     const auto with_terms = [&](std::size_t i, const auto& put) {
-        const auto* const left = reinterpret_cast<const Pair*>(a + offsets[i]);
-        const auto* right = reinterpret_cast<const Pair*>(b - offsets[i]);
+        const auto* const left = reinterpret_cast<const Pair*>(a + terms.offsets[i]);
+        const auto* right = reinterpret_cast<const Pair*>(b - terms.offsets[i]);
         asm("" : "+r"(right));  // else g++ computes each address anew
         for (std::size_t l = 0; l < pairs; ++l) {
-            put(sum[l], weighted ? of.weights[i] * left[l] * right[l] : left[l] * right[l]);
+            put(sum[l], weighted ? terms.weights[i] * left[l] * right[l] : left[l] * right[l]);
         }
     };
     with_terms(0, [](Pair& to, Pair term) { to = term; });
-    for (std::size_t i = 1; i <= static_cast<std::size_t>(of.last); ++i) {
+    for (std::size_t i = 1; i < terms.count; ++i) {
         with_terms(i, [](Pair& to, Pair term) { to += term; });
     }
     for (std::size_t l = 0; l < pairs; ++l) reinterpret_cast<Pair*>(sums)[l] = sum[l];
 }
 
-/// In each lane the sum of weight_j a_j b_{-j} for j from 0 to `last`, added as by
-/// `reversed_product`.
+/// In each lane the sum of weight_j a_j b_{-j}.
 template <bool weighted>
-void sum_rows(const double* a, const double* b, const SumOfRows& of, std::size_t lanes,
+void sum_rows(const double* a, const double* b, const TermsOfRows& terms, std::size_t lanes,
               double* sums)
 {
-    Offsets offsets;
-    for (int i = 0; i <= of.last; ++i) {
-        const int j = weighted ? i : outward(0, of.last, i);
-        offsets[static_cast<std::size_t>(i)] = j * static_cast<std::ptrdiff_t>(of.width);
-    }
     const std::size_t pairs = (lanes + 1) / 2;
     std::size_t l = 0;
     for (; l + 8 <= 2 * pairs; l += 8) {
-        sum_block<4, weighted>(a + l, b + l, offsets, of, sums + l);
+        sum_block<4, weighted>(a + l, b + l, terms, sums + l);
     }
     switch (pairs % 4) {
-        case 1: return sum_block<1, weighted>(a + l, b + l, offsets, of, sums + l);
-        case 2: return sum_block<2, weighted>(a + l, b + l, offsets, of, sums + l);
-        case 3: return sum_block<3, weighted>(a + l, b + l, offsets, of, sums + l);
+        case 1: return sum_block<1, weighted>(a + l, b + l, terms, sums + l);
+        case 2: return sum_block<2, weighted>(a + l, b + l, terms, sums + l);
+        case 3: return sum_block<3, weighted>(a + l, b + l, terms, sums + l);
         default: return;
     }
 }
@@ -196,6 +188,12 @@ void LazyTape::arrange()
         outputs_.push_back(places_[static_cast<std::size_t>(output)]);
     }
     rows_.assign((most_taylor_order + 1) * width_, 0);
+    for (int last = 0; last <= most_taylor_order; ++last) {
+        for (int i = 0; i <= last; ++i) {
+            outward_[static_cast<std::size_t>(last)][static_cast<std::size_t>(i)] =
+                outward(0, last, i) * static_cast<std::ptrdiff_t>(width_);
+        }
+    }
     inverses_.assign(width_, 0);
     factors_.assign(width_, 0);
     for (std::size_t i = 0; i < tape_.ops_count; ++i) factors_[places_[i]] = constants_[i];
@@ -270,6 +268,163 @@ std::size_t LazyTape::slopes_of(std::size_t first, std::size_t count, bool late)
 
 // --- computation ---
 
+/// sum of a_j b_{k-j} for j from lo to hi, in each of `count` lanes
+[[gnu::always_inline]] inline void LazyTape::convolve(std::size_t a, std::size_t b, Terms terms,
+                                                      std::size_t count, double* sums)
+{
+    const auto& [k, lo, hi] = terms;
+    if (hi < lo) {
+        std::fill_n(sums, count, 0.0);
+        return;
+    }
+    const auto last = static_cast<std::size_t>(hi - lo);
+    sum_rows<false>(row(lo) + a, row(k - lo) + b, {last + 1, outward_[last].data(), nullptr}, count,
+                    sums);
+}
+
+/// sum of a_j a_{k-j} for j from lo to k - lo
+[[gnu::always_inline]] inline void LazyTape::square(std::size_t a, int k, int lo, std::size_t count)
+{
+    convolve(a, a, {k, lo, (k - 1) / 2}, count, sums_.data());
+    const bool has_middle = k % 2 == 0 && lo <= k / 2;
+    const double* const middle = row(k / 2) + a;
+    for (std::size_t l = 0; l < count; ++l) {
+        const double twice = 2 * sums_[l];
+        sums_[l] = has_middle ? twice + middle[l] * middle[l] : twice;
+    }
+}
+
+/// sum of ((exponent + 1) j / k - 1) a_j p_{k-j} for j from 1 to hi, with the results p
+void LazyTape::power(const Batch& batch, int k, int hi)
+{
+    if (hi < 1) {
+        std::ranges::fill(sums_, 0.0);
+        return;
+    }
+    std::array<double, most_terms> weights{};
+    std::array<std::ptrdiff_t, most_terms> offsets{};
+    const double each = (batch.exponent + 1) / k;
+    for (int j = 1; j <= hi; ++j) {
+        weights[static_cast<std::size_t>(j - 1)] = each * j - 1;
+        offsets[static_cast<std::size_t>(j - 1)] = (j - 1) * static_cast<std::ptrdiff_t>(width_);
+    }
+    sum_rows<true>(row(1) + batch.a, row(k - 1) + batch.first,
+                   {static_cast<std::size_t>(hi), offsets.data(), weights.data()},
+                   batch.lanes.size(), sums_.data());
+}
+
+[[gnu::always_inline]] inline void LazyTape::add_up(const Batch& batch, int k)
+{
+    const std::size_t count = batch.lanes.size();
+    const std::size_t own = batch.first;
+    const double* const a = row(k) + batch.a;
+    double* const out = row(k) + own;
+    const int upto_a = std::min(batch.degree_a, k), upto_b = std::min(batch.degree_b, k);
+    const double* const inverses = inverses_.data() + own;
+    const auto scale = [&](const auto& numerator) {
+        for (std::size_t l = 0; l < count; ++l) {
+            out[l] = numerator(l) * inverses[l];
+        }
+    };
+    switch (batch.op) {
+        case TaylorOp::product:
+            return convolve(batch.a, batch.b, {k, std::max(0, k - batch.degree_b), upto_a}, count,
+                            out);
+        case TaylorOp::square:
+            square(batch.a, k, std::max(0, k - batch.degree_a), count);
+            std::copy_n(sums_.data(), count, out);
+            return;
+        case TaylorOp::quotient:
+            convolve(batch.b, own, {k, 1, upto_b}, count, sums_.data());
+            return scale([&](std::size_t l) { return a[l] - sums_[l]; });
+        case TaylorOp::constant_over:
+            convolve(batch.a, own, {k, 1, upto_a}, count, sums_.data());
+            return scale([&](std::size_t l) { return sums_[l]; });
+        case TaylorOp::square_root:
+            square(own, k, 1, count);
+            return scale([&](std::size_t l) { return a[l] - sums_[l]; });
+        default: power(batch, k, upto_a); return scale([&](std::size_t l) { return sums_[l]; });
+    }
+}
+
+/// Coefficients of functions g(a) with g' = f(a) a'.
+[[gnu::always_inline]] inline void LazyTape::add_up_function(const Batch& batch, int k)
+{
+    const std::size_t count = batch.lanes.size();
+    const std::size_t f = batch.op == TaylorOp::exponential ? batch.first : batch.b;
+    convolve(batch.slope_a, f, {k, 1, std::min(batch.degree_a, k)}, count, sums_.data());
+    const double* const a = row(k) + batch.a;
+    double* const out = row(k) + batch.first;
+    for (std::size_t l = 0; l < count; ++l) {
+        const double sum = sums_[l] / k;
+        switch (batch.op) {
+            case TaylorOp::cosine: out[l] = -sum; break;
+            case TaylorOp::tangent: out[l] = a[l] + sum; break;
+            case TaylorOp::hyperbolic_tangent: out[l] = a[l] - sum; break;
+            default: out[l] = sum;
+        }
+    }
+}
+
+/// Coefficients of functions g(a) with f(a) g' = a'.
+void LazyTape::add_up_inverse(const Batch& batch, int k)
+{
+    const std::size_t count = batch.lanes.size();
+    const int da = batch.degree_a, db = batch.degree_b;
+    const double* const inverses = inverses_.data() + batch.first;
+    const double* const a = row(k) + batch.a;
+    double* const out = row(k) + batch.first;
+    if (batch.op == TaylorOp::angle) {
+        // c g' = a' b - b' a
+        convolve(batch.slope_a, batch.b, {k, std::max(1, k - db), std::min(da, k)}, count,
+                 sums_.data());
+        convolve(batch.slope_b, batch.a, {k, std::max(1, k - da), std::min(db, k)}, count,
+                 other_sums_.data());
+        for (std::size_t l = 0; l < count; ++l) out[l] = sums_[l] - other_sums_[l];
+        convolve(batch.slope, batch.c, {k, std::max(1, k - batch.degree_c), k - 1}, count,
+                 sums_.data());
+        for (std::size_t l = 0; l < count; ++l) {
+            out[l] = (out[l] - sums_[l]) * inverses[l] / k;
+        }
+        return;
+    }
+    const bool of_a = batch.op == TaylorOp::logarithm;
+    const int from = std::max(1, k - (of_a ? da : db));
+    convolve(batch.slope, of_a ? batch.a : batch.b, {k, from, k - 1}, count, sums_.data());
+    const double sign = batch.op == TaylorOp::arc_cosine ? -1 : 1;
+    for (std::size_t l = 0; l < count; ++l) {
+        out[l] = (sign * a[l] - sums_[l] / k) * inverses[l];
+    }
+}
+
+[[gnu::always_inline]] inline void LazyTape::compute_batch(const Batch& batch, int k)
+{
+    const double* const from = row(k);
+    const Lane* const lanes = batch.lanes.data();
+    const double* const factors = factors_.data() + batch.first;
+    const auto put = [&](const auto& f) { fill(row(k) + batch.first, batch.lanes.size(), f); };
+    const auto a = [=](std::size_t l) { return from[lanes[l].a]; };
+    const auto b = [=](std::size_t l) { return from[lanes[l].b]; };
+    if (batch.pass == Pass::slope) return put([=](std::size_t l) { return k * a(l); });
+    if (batch.pass == Pass::copy) return put(a);
+    switch (batch.op) {
+        case TaylorOp::input:
+        case TaylorOp::constant: return;
+        case TaylorOp::sum: return put([=](std::size_t l) { return a(l) + b(l); });
+        case TaylorOp::difference: return put([=](std::size_t l) { return a(l) - b(l); });
+        case TaylorOp::negative:
+        case TaylorOp::constant_minus: return put([=](std::size_t l) { return -a(l); });
+        case TaylorOp::plus_constant:
+        case TaylorOp::minus_constant: return put(a);
+        case TaylorOp::times_constant:
+        case TaylorOp::over_constant: return put([=](std::size_t l) { return factors[l] * a(l); });
+        default:
+            if (is_function(batch.op)) return add_up_function(batch, k);
+            if (is_inverse(batch.op)) return add_up_inverse(batch, k);
+            add_up(batch, k);
+    }
+}
+
 int LazyTape::compute(double t, const double* x, const TaylorCoefficients<double>& to)
 {
     const int order = is_polynomial() ? degree_ : to.order;
@@ -335,155 +490,6 @@ void LazyTape::keep_guards(int k, double* guards) const
     const std::size_t m = tape_.guards;
     for (std::size_t i = 0; i < m; ++i) {
         guards[static_cast<std::size_t>(k) * m + i] = row(k)[outputs_[tape_.states + i]];
-    }
-}
-
-void LazyTape::compute_batch(const Batch& batch, int k)
-{
-    const double* const from = row(k);
-    const Lane* const lanes = batch.lanes.data();
-    const double* const factors = factors_.data() + batch.first;
-    const auto put = [&](const auto& f) { fill(row(k) + batch.first, batch.lanes.size(), f); };
-    const auto a = [=](std::size_t l) { return from[lanes[l].a]; };
-    const auto b = [=](std::size_t l) { return from[lanes[l].b]; };
-    if (batch.pass == Pass::slope) return put([=](std::size_t l) { return k * a(l); });
-    if (batch.pass == Pass::copy) return put(a);
-    switch (batch.op) {
-        case TaylorOp::input:
-        case TaylorOp::constant: return;
-        case TaylorOp::sum: return put([=](std::size_t l) { return a(l) + b(l); });
-        case TaylorOp::difference: return put([=](std::size_t l) { return a(l) - b(l); });
-        case TaylorOp::negative:
-        case TaylorOp::constant_minus: return put([=](std::size_t l) { return -a(l); });
-        case TaylorOp::plus_constant:
-        case TaylorOp::minus_constant: return put(a);
-        case TaylorOp::times_constant:
-        case TaylorOp::over_constant: return put([=](std::size_t l) { return factors[l] * a(l); });
-        default:
-            if (is_function(batch.op)) return add_up_function(batch, k);
-            if (is_inverse(batch.op)) return add_up_inverse(batch, k);
-            add_up(batch, k);
-    }
-}
-
-/// sum of a_j b_{k-j} for j from lo to hi, in each of `count` lanes
-void LazyTape::convolve(std::size_t a, std::size_t b, Terms terms, std::size_t count, double* sums)
-{
-    const auto& [k, lo, hi] = terms;
-    if (hi < lo) {
-        std::fill_n(sums, count, 0.0);
-        return;
-    }
-    sum_rows<false>(row(lo) + a, row(k - lo) + b, {hi - lo, width_, nullptr}, count, sums);
-}
-
-/// sum of a_j a_{k-j} for j from lo to k - lo
-void LazyTape::square(std::size_t a, int k, int lo, std::size_t count)
-{
-    convolve(a, a, {k, lo, (k - 1) / 2}, count, sums_.data());
-    const bool has_middle = k % 2 == 0 && lo <= k / 2;
-    const double* const middle = row(k / 2) + a;
-    for (std::size_t l = 0; l < count; ++l) {
-        const double twice = 2 * sums_[l];
-        sums_[l] = has_middle ? twice + middle[l] * middle[l] : twice;
-    }
-}
-
-/// sum of ((exponent + 1) j / k - 1) a_j p_{k-j} for j from 1 to hi, with the results p
-void LazyTape::power(const Batch& batch, int k, int hi)
-{
-    std::array<double, most_terms> weights{};
-    const double each = (batch.exponent + 1) / k;
-    for (int j = 1; j <= hi; ++j) weights[static_cast<std::size_t>(j - 1)] = each * j - 1;
-    if (hi < 1) {
-        std::ranges::fill(sums_, 0.0);
-        return;
-    }
-    sum_rows<true>(row(1) + batch.a, row(k - 1) + batch.first, {hi - 1, width_, weights.data()},
-                   batch.lanes.size(), sums_.data());
-}
-
-void LazyTape::add_up(const Batch& batch, int k)
-{
-    const std::size_t count = batch.lanes.size();
-    const std::size_t own = batch.first;
-    const double* const a = row(k) + batch.a;
-    double* const out = row(k) + own;
-    const int upto_a = std::min(batch.degree_a, k), upto_b = std::min(batch.degree_b, k);
-    const double* const inverses = inverses_.data() + own;
-    const auto scale = [&](const auto& numerator) {
-        for (std::size_t l = 0; l < count; ++l) {
-            out[l] = numerator(l) * inverses[l];
-        }
-    };
-    switch (batch.op) {
-        case TaylorOp::product:
-            return convolve(batch.a, batch.b, {k, std::max(0, k - batch.degree_b), upto_a}, count,
-                            out);
-        case TaylorOp::square:
-            square(batch.a, k, std::max(0, k - batch.degree_a), count);
-            std::copy_n(sums_.data(), count, out);
-            return;
-        case TaylorOp::quotient:
-            convolve(batch.b, own, {k, 1, upto_b}, count, sums_.data());
-            return scale([&](std::size_t l) { return a[l] - sums_[l]; });
-        case TaylorOp::constant_over:
-            convolve(batch.a, own, {k, 1, upto_a}, count, sums_.data());
-            return scale([&](std::size_t l) { return sums_[l]; });
-        case TaylorOp::square_root:
-            square(own, k, 1, count);
-            return scale([&](std::size_t l) { return a[l] - sums_[l]; });
-        default: power(batch, k, upto_a); return scale([&](std::size_t l) { return sums_[l]; });
-    }
-}
-
-/// Coefficients of functions g(a) with g' = f(a) a'.
-void LazyTape::add_up_function(const Batch& batch, int k)
-{
-    const std::size_t count = batch.lanes.size();
-    const std::size_t f = batch.op == TaylorOp::exponential ? batch.first : batch.b;
-    convolve(batch.slope_a, f, {k, 1, std::min(batch.degree_a, k)}, count, sums_.data());
-    const double* const a = row(k) + batch.a;
-    double* const out = row(k) + batch.first;
-    for (std::size_t l = 0; l < count; ++l) {
-        const double sum = sums_[l] / k;
-        switch (batch.op) {
-            case TaylorOp::cosine: out[l] = -sum; break;
-            case TaylorOp::tangent: out[l] = a[l] + sum; break;
-            case TaylorOp::hyperbolic_tangent: out[l] = a[l] - sum; break;
-            default: out[l] = sum;
-        }
-    }
-}
-
-/// Coefficients of functions g(a) with f(a) g' = a'.
-void LazyTape::add_up_inverse(const Batch& batch, int k)
-{
-    const std::size_t count = batch.lanes.size();
-    const int da = batch.degree_a, db = batch.degree_b;
-    const double* const inverses = inverses_.data() + batch.first;
-    const double* const a = row(k) + batch.a;
-    double* const out = row(k) + batch.first;
-    if (batch.op == TaylorOp::angle) {
-        // c g' = a' b - b' a
-        convolve(batch.slope_a, batch.b, {k, std::max(1, k - db), std::min(da, k)}, count,
-                 sums_.data());
-        convolve(batch.slope_b, batch.a, {k, std::max(1, k - da), std::min(db, k)}, count,
-                 other_sums_.data());
-        for (std::size_t l = 0; l < count; ++l) out[l] = sums_[l] - other_sums_[l];
-        convolve(batch.slope, batch.c, {k, std::max(1, k - batch.degree_c), k - 1}, count,
-                 sums_.data());
-        for (std::size_t l = 0; l < count; ++l) {
-            out[l] = (out[l] - sums_[l]) * inverses[l] / k;
-        }
-        return;
-    }
-    const bool of_a = batch.op == TaylorOp::logarithm;
-    const int from = std::max(1, k - (of_a ? da : db));
-    convolve(batch.slope, of_a ? batch.a : batch.b, {k, from, k - 1}, count, sums_.data());
-    const double sign = batch.op == TaylorOp::arc_cosine ? -1 : 1;
-    for (std::size_t l = 0; l < count; ++l) {
-        out[l] = (sign * a[l] - sums_[l] / k) * inverses[l];
     }
 }
 

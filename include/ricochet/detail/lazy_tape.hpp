@@ -4,6 +4,7 @@
 // operation by operation, for flows whose operations the compiler cannot know.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -125,6 +126,8 @@ private:
     std::vector<Batch> batches_;        ///< in their order
     std::vector<Batch> late_;           ///< of what a row is read from in the next ones alone
     std::size_t width_ = 0;
+    /// Where the terms of a sum of `last` + 1 are, in the order in which they are added.
+    std::array<std::array<std::ptrdiff_t, most_taylor_order + 1>, most_taylor_order + 1> outward_{};
     std::vector<double> rows_;      ///< a row of coefficients for each order
     std::vector<double> factors_;   ///< constants by place
     std::vector<double> inverses_;  ///< by place
