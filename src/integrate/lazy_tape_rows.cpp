@@ -44,7 +44,7 @@ template <std::size_t pairs, bool weighted>
     const auto with_terms = [&](std::size_t i, const auto& put) {
         const auto* const left = reinterpret_cast<const Pair*>(a + terms.offsets[i]);
         const auto* right = reinterpret_cast<const Pair*>(b - terms.offsets[i]);
-        asm("" : "+r"(right));  // else g++ computes each address anew
+        asm("" : "+r"(right));  // else g++ computes every address again
         for (std::size_t l = 0; l < pairs; ++l) {
             put(sum[l], weighted ? terms.weights[i] * left[l] * right[l] : left[l] * right[l]);
         }
