@@ -126,7 +126,10 @@ void Loop<X, single>::go_back_to_mark()
         steps -= mark.tentative;
         mark.next_sample = first.samples;
     }
-    if (defers_) planner_->steps().clear();
+    if (defers_) {
+        planner_->steps().clear();
+        planner_->forget_wrong();
+    }
     if (mark.planned) {
         // Deadlines may be half renewed: they are found again at the start of the step.
         replans_ = true;

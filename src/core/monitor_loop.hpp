@@ -75,6 +75,7 @@ public:
         this->pending_ = Pending::nothing;
         this->level_ = 0;
         search_.fired().clear();
+        if (defers_) planner_->forget_wrong();
         step_.restart(t, x, mode);
         place_rate(dxdt);
         h_next_ = scale;

@@ -270,6 +270,9 @@ public:
     /// The bound that a guard has violated.
     [[nodiscard]] const std::optional<WrongBound<X>>& wrong() const noexcept { return wrong_; }
 
+    /// Forgets a violation that the motion from here on is not known to repeat.
+    void forget_wrong() noexcept { wrong_.reset(); }
+
     template <class Visit>
     void visit(Visit&& visit)
     {

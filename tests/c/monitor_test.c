@@ -688,8 +688,40 @@ static void takes_structs_of_fewer_fields(void)
     CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
 }
 
+/* The speed of a ball as its bound, and a bound that it exceeds. */
+static int false_speed_bound(void* user, size_t which, rc_mode mode, double t, const double* x,
+                             size_t n, double* bound)
+{
+    (void)which, (void)mode, (void)t, (void)x, (void)n;
+    *bound = *(const int*)user ? 5 : 100;
+    return 0;
+}
+
+static void starts_again_after_a_wrong_bound(void)
+{
+    rc_callbacks callbacks = ball_callbacks();
+    rc_monitor_options options = monitor_options();
+    rc_monitor* monitor;
+    struct host host;
+    struct met met = {0};
+    int lies = 1;
+    callbacks.user = &lies;
+    callbacks.speed_bound = false_speed_bound;
+    options.detector = RC_PLANNED;
+    monitor = monitor_of(&callbacks, &options);
+    CHECK(host_start(&host, monitor, &callbacks, 0, start, 0.1) == RC_STANDS);
+    CHECK(host_run(&host, monitor, RC_STANDS, 20.5, 0.1, &met) == RC_ENDED);
+    CHECK(rc_monitor_outcome(monitor) == RC_WRONG_BOUND && met.cuts == 0);
+    lies = 0;
+    CHECK(host_start(&host, monitor, &callbacks, 0, start, 0.1) == RC_STANDS);
+    CHECK(host_run(&host, monitor, RC_STANDS, 20.5, 0.1, &met) == RC_STANDS);
+    CHECK(met.cuts == 13 && rc_monitor_outcome(monitor) == RC_RUNNING);
+    CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+}
+
 int main(void)
 {
+    starts_again_after_a_wrong_bound();
     finds_the_impacts_of_a_ball();
     finds_simultaneous_impacts_in_sets();
     comes_to_rest_and_is_held_until_a_time_event();
