@@ -117,6 +117,15 @@ protected:
 
     void add_evidence(Evidence evidence, std::uint64_t steps) noexcept;
 
+    /// Brings the statistics up to date with what the step, the search and the planner have counted.
+    void collect_counts() noexcept
+    {
+        run_.statistics.flow_calls = step_.flow_calls();
+        run_.statistics.resteps = step_.resteps();
+        if (defers_) planner_->add_counts(run_.statistics);
+        run_.statistics.disabled += std::exchange(search_.disabled, 0);
+    }
+
     // --- time events ---
 
     /// Finds the next time event. One that does not lie ahead would be lost, with all after it.

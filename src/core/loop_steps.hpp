@@ -52,10 +52,7 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
     run_.t = step_.start().value;
     run_.x = step_.x0();
     run_.mode = step_.mode();
-    run_.statistics.flow_calls = step_.flow_calls();
-    run_.statistics.resteps = step_.resteps();
-    if (defers_) planner_->add_counts(run_.statistics);
-    run_.statistics.disabled += std::exchange(search_.disabled, 0);
+    this->collect_counts();
     if (ended_) {
         emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
         record_restart();

@@ -299,8 +299,11 @@ private:
     Verdict or_start_anew(const Function& function)
     {
         try {
-            return function();
+            const Verdict verdict = function();
+            this->collect_counts();
+            return verdict;
         } catch (...) {
+            this->collect_counts();
             started_ = resting_ = false;
             this->pending_ = Pending::nothing;
             step_.restart(step_.start(), step_.x0(), step_.mode());

@@ -196,7 +196,7 @@ public:
     /// x(t0 + s) by the method's own step of length s from the start.
     void restep(double s, X& x) const
     {
-        ++resteps_;
+        count_restep();
         if (state_.host) return restep_on_host(s, x);
         kernel_->depart(system_.door(), state_, s, x, unused_rate_);
         add_tangent(s, x);
@@ -216,7 +216,7 @@ public:
     /// x(t0 + s) by the method's own step, and the flow there.
     void restep(double s, X& x, X& dxdt) const
     {
-        ++resteps_;
+        count_restep();
         if (state_.host) {
             restep_on_host(s, x);
             return rate_on_host(s, dxdt);
@@ -433,6 +433,8 @@ public:
     /// Whether every call of the flow has given its rate as many components as the state.
     [[nodiscard]] bool flow_fits() const noexcept { return state_.flow_fits; }
     [[nodiscard]] std::uint64_t flow_calls() const noexcept { return state_.flow_calls; }
+    /// The place on the path of a host that cannot repeat its step is no such repetition.
+    void count_restep() const noexcept { resteps_ += !state_.host || state_.host->restep; }
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
 
 private:

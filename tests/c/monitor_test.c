@@ -719,9 +719,80 @@ static void starts_again_after_a_wrong_bound(void)
     CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
 }
 
+struct tally {
+    uint64_t flows, resteps;
+};
+
+static int tallied_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+{
+    ++((struct tally*)user)->flows;
+    return ball_flow(user, mode, t, x, dxdt, n);
+}
+
+static int tallied_restep(void* user, double s, double* x, size_t n)
+{
+    const double fall[2] = {10, 0};
+    ++((struct tally*)user)->resteps;
+    (void)n;
+    x[0] = fall[0] - 9.81 / 2 * s * s;
+    x[1] = fall[1] - 9.81 * s;
+    return 0;
+}
+
+static int moving_guard(void* user, size_t which, rc_mode mode, double t, const double* x, size_t n,
+                        double* g)
+{
+    (void)user, (void)which, (void)mode, (void)n;
+    *g = x[0] - 0.1 * t * t * t;
+    return 0;
+}
+
+static int only_while_high(void* user, size_t which, rc_mode mode, double t, const double* x,
+                           size_t n, int* yes)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)n;
+    *yes = x[0] > 5;
+    return 0;
+}
+
+static void counts_flows_resteps_and_disabled_crossings(void)
+{
+    const double from[2] = {10, 0}, rate0[2] = {0, -9.81}, rate1[2] = {-9.81 * 2, -9.81};
+    const double to[2] = {10 - 9.81 * 2, -9.81 * 2};
+    rc_callbacks callbacks = ball_callbacks();
+    int k;
+    for (k = 0; k < 3; ++k) { /* with a map of the host's own, without one, and disabled */
+        struct tally tally = {0, 0};
+        rc_host_step step;
+        rc_monitor* monitor;
+        rc_verdict verdict;
+        callbacks.user = &tally;
+        callbacks.flow = tallied_flow;
+        callbacks.guard = moving_guard;
+        callbacks.enabled = k == 2 ? only_while_high : NULL;
+        monitor = monitor_of(&callbacks, NULL);
+        CHECK_STATUS(RC_OK, rc_monitor_start(monitor, 0, from, NULL, 2, 0, 2, &verdict));
+        memset(&step, 0, sizeof step);
+        step.size = sizeof step;
+        step.n = 2;
+        step.h = 2;
+        step.x0 = from, step.x1 = to, step.rate0 = rate0, step.rate1 = rate1;
+        step.user = &tally;
+        step.restep = k == 0 ? tallied_restep : NULL;
+        CHECK_STATUS(RC_OK, rc_monitor_examine(monitor, &step, &verdict));
+        CHECK(verdict == (k == 2 ? RC_STANDS : RC_CUT));
+        CHECK(tally.flows > 0 && counts_of(monitor).flow_calls == tally.flows);
+        CHECK((tally.resteps > 0) == (k == 0));
+        CHECK(counts_of(monitor).resteps == tally.resteps);
+        CHECK(counts_of(monitor).disabled == (k == 2));
+        CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+    }
+}
+
 int main(void)
 {
     starts_again_after_a_wrong_bound();
+    counts_flows_resteps_and_disabled_crossings();
     finds_the_impacts_of_a_ball();
     finds_simultaneous_impacts_in_sets();
     comes_to_rest_and_is_held_until_a_time_event();
