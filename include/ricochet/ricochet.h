@@ -427,7 +427,8 @@ RC_API rc_status rc_solution_mode(rc_simulation* simulation, double t, rc_mode* 
 /** Saves everything on which the future of the run depends, as text without a terminating zero. On
  *  entry `*size` is the capacity of `bytes`, on return the number of bytes needed. If `bytes` is
  *  null, only that number is computed; RC_INVALID if the capacity is too small. Recorded results
- *  are not saved. */
+ *  are not saved. After a failure of a callback guards may be evaluated: RC_CALLBACK if they fail.
+ */
 RC_API rc_status rc_save(rc_simulation* simulation, void* bytes, size_t* size);
 /** Returns to a state saved from this or another simulation of the same system with the same
  *  options; only the end, the sample times and what is recorded may differ. Recorded results are

@@ -18,8 +18,11 @@ inline Snapshot Loop<X, single>::save()
 template <class X, bool single>
 inline void Loop<X, single>::restore(const Snapshot& snapshot)
 {
-    const Snapshot old = save();
+    // Not by `save`, which may have to evaluate guards.
+    Snapshot old;
+    old.run = properties();
     require_same_run(snapshot.run, old.run);
+    visit_state(SnapshotWriter(old));
     try {
         SnapshotReader reader(snapshot);
         visit_state(reader);
@@ -32,7 +35,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
     }
     step_.restart(place_);
     next_review_ = 0;
-    watching_ = false;
+    watching_ = replans_ = false;
     show_all();
     if (guarded_) search_.begin(step_.x0());
     if (defers_) planner_->restore(bank_);

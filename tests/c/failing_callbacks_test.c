@@ -312,6 +312,68 @@ static int ends_alike(const struct result* a, const struct result* b)
            a->mode == b->mode && a->events == b->events;
 }
 
+static int flow_until_it_fails(void* user, rc_mode mode, double t, const double* x, double* dxdt,
+                               size_t n)
+{
+    return *(int*)user ? 42 : ball_flow(NULL, mode, t, x, dxdt, n);
+}
+static int guard_until_it_fails(void* user, size_t which, rc_mode mode, double t, const double* x,
+                                size_t n, double* g)
+{
+    return *(int*)user ? 43 : ball_guard(NULL, which, mode, t, x, n, g);
+}
+static int bound_of_ball(void* user, size_t which, rc_mode mode, double t, const double* x,
+                         size_t n, double* bound)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)n;
+    *bound = 9.81 + fabs(x[1]);
+    return 0;
+}
+
+/* A run whose callbacks still fail returns to a snapshot all the same. */
+static void returns_while_callbacks_fail(void)
+{
+    static char bytes[1 << 16];
+    size_t size = sizeof bytes, needed = 0;
+    int fails = 0, i;
+    rc_callbacks callbacks = ball_callbacks();
+    rc_options options = options_until(3);
+    rc_callback_error error;
+    rc_simulation* simulation;
+    double x[2], t;
+    callbacks.user = &fails;
+    callbacks.flow = flow_until_it_fails;
+    callbacks.guard = guard_until_it_fails;
+    callbacks.speed_bound = bound_of_ball;
+    callbacks.acceleration_bound = bound_of_ball;
+    options.detector = RC_PLANNED;
+    options.h_max = 0.05;
+    simulation = start_ball(&callbacks, &options);
+    for (i = 0; i < 5; ++i) CHECK_STATUS(RC_OK, rc_step(simulation, NULL));
+    CHECK_STATUS(RC_OK, rc_save(simulation, bytes, &size));
+    t = rc_time(simulation);
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    memcpy(x, rc_state(simulation), sizeof x);
+    CHECK_STATUS(RC_OK, rc_restore(simulation, bytes, size));
+    for (i = 0; i < 9; ++i) CHECK_STATUS(RC_OK, rc_step(simulation, NULL));
+    fails = 1;
+    CHECK_STATUS(RC_CALLBACK, rc_run(simulation));
+    error.size = sizeof error;
+    CHECK_STATUS(RC_OK, rc_callback_failure(simulation, &error));
+    CHECK(error.code == 42 && strcmp(error.callback, "flow") == 0);
+    CHECK_STATUS(RC_CALLBACK, rc_save(simulation, NULL, &needed));
+    CHECK_STATUS(RC_OK, rc_callback_failure(simulation, &error));
+    CHECK(error.code == 43 && strcmp(error.callback, "guard") == 0);
+    CHECK_STATUS(RC_INVALID, rc_restore(simulation, bytes, size - 1));
+    CHECK(rc_outcome(simulation) == RC_STOPPED_BY_CALLBACK);
+    CHECK_STATUS(RC_OK, rc_restore(simulation, bytes, size));
+    CHECK(rc_outcome(simulation) == RC_RUNNING && rc_time(simulation) == t);
+    fails = 0;
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    CHECK(memcmp(x, rc_state(simulation), sizeof x) == 0);
+    CHECK_STATUS(RC_OK, rc_simulation_free(simulation));
+}
+
 int main(void)
 {
     static const struct setting settings[] = {
@@ -330,6 +392,7 @@ int main(void)
     };
     size_t seen[calls_of] = {0};
     size_t s, k;
+    returns_while_callbacks_fail();
     for (s = 0; s < sizeof settings / sizeof settings[0]; ++s) {
         const struct setting* of = &settings[s];
         struct world undisturbed;

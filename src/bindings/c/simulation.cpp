@@ -273,9 +273,14 @@ rc_status rc_solution_mode(rc_simulation* simulation, double t, rc_mode* mode)
 
 rc_status rc_save(rc_simulation* simulation, void* bytes, size_t* size)
 {
-    return with(simulation, [&](const rc_simulation& at) {
+    return with(simulation, [&](rc_simulation& at) {
         if (!size) throw_null("rc_save, size");
-        write_snapshot("rc_save", at.run->save(), bytes, size);
+        try {
+            write_snapshot("rc_save", at.run->save(), bytes, size);
+        } catch (const CallbackFailed& failed) {
+            at.failed = failed;
+            throw;
+        }
     });
 }
 
