@@ -73,6 +73,37 @@ struct Clock {
     void time_reset(double, X& x) const { x[1] += 1; }
 };
 
+/// A ball on a high floor, and its passages through a height, whose guards and rates come from one
+/// call each.
+struct Together {
+    using X = std::array<double, 2>;
+    static constexpr std::size_t guard_count = 2;
+    static constexpr bool has_rest = false;
+    static constexpr bool unilateral = false;
+
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+    void guards(double, const X& x, std::span<double> g) const
+    {
+        g[0] = x[0] - 1000;
+        g[1] = x[0] - 1002;
+    }
+    void guard_rates(double, const X&, const X& dxdt, std::span<double> rates) const
+    {
+        rates[0] = rates[1] = dxdt[0];
+    }
+    void reset(std::size_t which, double, X& x) const
+    {
+        if (which == 0) x = {1000, -0.5 * x[1]};
+    }
+};
+
+template <class System>
+concept RatedTogether = requires(const System& system, const typename System::X& x,
+                                 std::span<double> numbers)
+{
+    system.guard_rates(0, x, x, numbers);
+};
+
 template <class System>
 concept Timed = requires(const System& system)
 {
@@ -103,7 +134,21 @@ class Callbacks {
     static int guard(void* user, std::size_t which, rc_mode, double t, const double* x, std::size_t,
                      double* g)
     {
-        *g = at(user).guard(which, t, read(x));
+        if constexpr (!RatedTogether<System>) *g = at(user).guard(which, t, read(x));
+        return 0;
+    }
+    static int guards(void* user, rc_mode, double t, const double* x, std::size_t, double* g,
+                      std::size_t count)
+    {
+        if constexpr (RatedTogether<System>) at(user).guards(t, read(x), {g, count});
+        return 0;
+    }
+    static int rates(void* user, rc_mode, double t, const double* x, const double* dxdt,
+                     std::size_t, double* rates, std::size_t count)
+    {
+        if constexpr (RatedTogether<System>) {
+            at(user).guard_rates(t, read(x), read(dxdt), {rates, count});
+        }
         return 0;
     }
     static int reset(void* user, std::size_t which, rc_mode*, double t, double* x, std::size_t)
@@ -148,7 +193,12 @@ public:
         callbacks.guard_infos = infos.data();
         callbacks.user = &system;
         callbacks.flow = &flow;
-        callbacks.guard = &guard;
+        if (RatedTogether<System>) {
+            callbacks.guards = &guards;
+            callbacks.guard_rates = &rates;
+        } else {
+            callbacks.guard = &guard;
+        }
         callbacks.reset = &reset;
         if (System::has_rest) callbacks.rest = &rest;
         if (Timed<System>) {
@@ -455,6 +505,7 @@ int main()
     CHECK(compare("a ball that comes to rest", Balls<1>{0.5}, {10, 0}, 20, 0.1, Verdict::rests) >
           5);
     CHECK(compare("one without rest", Restless{}, {10, 0}, 20, 0.1, Verdict::ended) > 5);
+    CHECK(compare("rates together", Together{}, {1003, 0}, 4, 0.1, Verdict::ended) > 5);
     CHECK(compare("a clock", Clock{}, {0, 0}, 12.5, 0.3, Verdict::stands) >= 12);
     return 0;
 }

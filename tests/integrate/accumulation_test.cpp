@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <string>
 
 #include "accumulating_systems.hpp"
@@ -415,6 +416,53 @@ TEST(Accumulation, ARestThatLeavesTheMotionPressingOnTheEndOfAGuardEndsTheRun)
         ASSERT_TRUE(simulation.ended()) << start;
         EXPECT_EQ(simulation.run().outcome, Outcome::zeno) << start;
         EXPECT_EQ(simulation.run().guard, 0u) << start;
+    }
+}
+
+/// A ball on a high floor, below a mark, whose rates come from one call.
+struct HighFloor {
+    static constexpr std::size_t guard_count = 2;
+    double floor = 1000;
+
+    void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+    void guards(double, const X& x, std::span<double> g) const
+    {
+        g[0] = x[0] - floor;
+        g[1] = floor + 50 - x[0];
+    }
+    void guard_rates(double, const X&, const X& dxdt, std::span<double> rates) const
+    {
+        rates[0] = dxdt[0];
+        rates[1] = -dxdt[0];
+    }
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        return {.resets = which == 0, .unilateral = which == 0};
+    }
+    void reset(std::size_t, double, X& x) const { x = {floor, -0.5 * x[1]}; }
+};
+
+/// The same with a call for each rate.
+struct HighFloorByParts : HighFloor {
+    [[nodiscard]] double guard_rate(std::size_t which, double, const X&, const X& dxdt) const
+    {
+        return which == 0 ? dxdt[0] : -dxdt[0];
+    }
+};
+
+TEST(Accumulation, RatesFromOneCallAreThoseFromACallForEach)
+{
+    for (const double floor : {0.0, 10.0, 1e3, 1e5}) {
+        const X start{floor + 3, 0};
+        const Options options{.t_end = 5, .max_steps = 5000};
+        const auto together = integrate(HighFloor{floor}, start, options);
+        const auto apart = integrate(HighFloorByParts{{floor}}, start, options);
+        ASSERT_EQ(together.outcome, Outcome::zeno) << floor;
+        EXPECT_NEAR(together.t, 3 * std::sqrt(6 / 9.81), 1e-4) << floor;
+        EXPECT_EQ(together.t, apart.t) << floor;
+        EXPECT_EQ(together.x, apart.x) << floor;
+        EXPECT_EQ(together.events.size(), apart.events.size()) << floor;
+        EXPECT_EQ(together.statistics.guard_calls, apart.statistics.guard_calls) << floor;
     }
 }
 

@@ -221,7 +221,7 @@ class TableOf {
         if constexpr (!GuardsTogether<System, X> && !RatesTogether<System, X>) {
             table.point = &point;
         }
-        table.calls_of_rate = RateAlone<System, X> ? 0 : 2;
+        table.calls_of_rate = RatedGuard<System, X> ? 0 : 2;
         table.guard = &guard;
         table.rate = &rate;
         if constexpr (Guard::template sees<View>) {

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "ricochet/detail/components.hpp"
@@ -147,13 +148,13 @@ public:
     }
 
     /// The rate at (t, x) with x' = dxdt: `guard_rate` of the system, else by dual numbers through
-    /// its guard where that takes any scalar, else `difference`, which also replaces a rate that is
-    /// not finite.
+    /// its guard where that takes any scalar, else from `guard_rates`, else `difference`, which
+    /// also replaces a rate that is not finite.
     template <class V, class D>
     [[nodiscard]] double rate(double t, const V& x, const D& dxdt, double scale) const
     {
         const double rate = raw_rate(t, x, dxdt, scale);
-        if constexpr (detail::RateAlone<System, V, D>) {
+        if constexpr (detail::RateAlone<System, V, D> || rated_together<V, D>) {
             constexpr double largest = std::numeric_limits<double>::max();
             if (!(std::fabs(rate) <= largest)) return replaced_rate(t, x, dxdt, scale);
         }
@@ -167,12 +168,20 @@ public:
     {
         if constexpr (detail::RateAlone<System, V, D>) {
             return known_rate(t, x, dxdt);
+        } else if constexpr (rated_together<V, D>) {
+            return rate_of_all(t, x, dxdt);
         } else {
             return difference(t, x, dxdt, scale);
         }
     }
 
 private:
+    /// Whether the system gives its rates, at a state, only all together.
+    template <class V, class D>
+    static constexpr bool rated_together =
+        std::is_same_v<V, D> && !detail::RateAlone<System, V, D> &&
+        detail::RatesTogether<System, V>;
+
     /// The rate in closed form.
     template <class V, class D>
     [[nodiscard, gnu::always_inline]] double known_rate(double t, const V& x, const D& dxdt) const
@@ -241,13 +250,32 @@ private:
     template <class V>
     [[nodiscard]] double one_of_all(double t, const V& x) const
     {
+        return one_of(
+            [&](std::span<double> all) { detail::call_guards(*system_, at_.mode, t, x, all); });
+    }
+
+    /// One rate of a system that computes its rates only all together.
+    [[nodiscard]] double rate_of_all(double t, const X& x, const X& dxdt) const
+    {
+        const auto along = [&](const X& forward) {
+            return one_of([&](std::span<double> all) {
+                detail::call_rates(*system_, detail::Along<X>{at_.mode, t, x, forward}, all);
+            });
+        };
+        return at_.backward ? -along(detail::negated(dxdt)) : along(dxdt);
+    }
+
+    /// This guard's number among those that `compute` writes for all guards.
+    template <class Compute>
+    [[nodiscard]] double one_of(const Compute& compute) const
+    {
         constexpr std::size_t fixed = fixed_guard_count<System, X>();
         constexpr std::size_t on_stack = fixed == counted_at_run_time ? 256 : fixed;
         const std::size_t count = guard_count_of<X>(*system_);
         std::array<double, on_stack> few;
         std::vector<double> many(count > on_stack ? count : 0);
         const std::span<double> all(count > on_stack ? many.data() : few.data(), count);
-        detail::call_guards(*system_, at_.mode, t, x, all);
+        compute(all);
         return all[at_.which];
     }
 
