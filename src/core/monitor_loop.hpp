@@ -69,7 +69,7 @@ public:
         options_.t_start = t.value;
         options_.mode = mode;
         this->refuse_bad_modes();
-        ended_ = resting_ = this->stops_ = false;
+        started_ = ended_ = resting_ = this->stops_ = false;
         run_.outcome = Outcome::reached_end;
         this->forget_cause();
         this->pending_ = Pending::nothing;
@@ -79,7 +79,6 @@ public:
         step_.restart(t, x, mode);
         place_rate(dxdt);
         h_next_ = scale;
-        started_ = false;
         if (timed_) this->find_time_event(true);
         bank_.forget();
         if (guarded_) this->arm_at_start();

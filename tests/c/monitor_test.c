@@ -789,8 +789,44 @@ static void counts_flows_resteps_and_disabled_crossings(void)
     }
 }
 
+static int flow_that_may_fail(void* user, rc_mode mode, double t, const double* x, double* dxdt,
+                              size_t n)
+{
+    return *(const int*)user ? 42 : ball_flow(user, mode, t, x, dxdt, n);
+}
+
+static void waits_for_a_start_after_one_has_failed(void)
+{
+    const double below[2] = {-3, 1}, end[2] = {-2.9, 1}, rate[2] = {1, 0};
+    rc_callbacks callbacks = ball_callbacks();
+    rc_monitor* monitor;
+    rc_host_step step;
+    rc_verdict verdict;
+    int fails = 0;
+    callbacks.user = &fails;
+    callbacks.flow = flow_that_may_fail;
+    monitor = monitor_of(&callbacks, NULL);
+    CHECK_STATUS(RC_OK, rc_monitor_start(monitor, 0, start, NULL, 2, 0, 0.1, &verdict));
+    fails = 1;
+    CHECK_STATUS(RC_CALLBACK, rc_monitor_start(monitor, 5, below, NULL, 2, 0, 0.1, &verdict));
+    CHECK(rc_monitor_outcome(monitor) == RC_STOPPED_BY_CALLBACK);
+    memset(&step, 0, sizeof step);
+    step.size = sizeof step;
+    step.n = 2;
+    step.t0 = 5;
+    step.h = 0.1;
+    step.x0 = below, step.x1 = end, step.rate0 = rate, step.rate1 = rate;
+    /* Its guard is still armed above the floor, where the first start was. */
+    CHECK_STATUS(RC_OUT_OF_TURN, rc_monitor_examine(monitor, &step, &verdict));
+    CHECK_STATUS(RC_OK, rc_monitor_start(monitor, 5, below, rate, 2, 0, 0.1, &verdict));
+    CHECK_STATUS(RC_OK, rc_monitor_examine(monitor, &step, &verdict));
+    CHECK(verdict == RC_STANDS && rc_monitor_event_count(monitor) == 0);
+    CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+}
+
 int main(void)
 {
+    waits_for_a_start_after_one_has_failed();
     starts_again_after_a_wrong_bound();
     counts_flows_resteps_and_disabled_crossings();
     finds_the_impacts_of_a_ball();
