@@ -46,7 +46,7 @@ class MonitorLoop : public AnyMonitor<X>, private EventEngine<X, single> {
 public:
     /// Keeps a reference to `setup`.
     MonitorLoop(const RunSetup<X>& setup, const X& like, const Options& options, bool cuts_at_all)
-        : Engine(setup, like, options)
+        : Engine(setup, like, options), components_(static_cast<std::size_t>(like.size()))
     {
         this->who_ = who;
         this->cuts_at_all_ = cuts_at_all;
@@ -429,7 +429,9 @@ private:
         return {{"monitor of", system_->name(system_.door())},
                 {"detector", plain_type_name(finders_.detector.type)},
                 {"locator", plain_type_name(finders_.locator.type)},
-                {"guards", std::to_string(bank_.size())}};
+                {"guards", std::to_string(bank_.size())},
+                {"components", std::to_string(components_)},
+                {"direction", backward_ ? "backward" : "forward"}};
     }
 
     void refuse_bad_place() const
@@ -470,6 +472,7 @@ private:
         }
     }
 
+    std::size_t components_;  ///< number of components of the state that it was made for
     Cut<X> cut_;
     bool started_ = false;
     bool departs_ = false;  ///< guards have been armed at the start of the next step

@@ -824,8 +824,45 @@ static void waits_for_a_start_after_one_has_failed(void)
     CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
 }
 
+static int still_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+{
+    size_t i;
+    (void)user, (void)mode, (void)t, (void)x;
+    for (i = 0; i < n; ++i) dxdt[i] = 0;
+    return 0;
+}
+
+/* A monitor of a system of another dimension, or of a host that runs the other way, has no use for
+ * a snapshot, although neither system has a name. */
+static void refuses_the_snapshot_of_another_dimension_or_direction(void)
+{
+    static const double five[5] = {1, 2, 3, 4, 5};
+    static char bytes[1 << 12];
+    size_t size = sizeof bytes, dimension;
+    rc_callbacks callbacks = ball_callbacks();
+    rc_verdict verdict;
+    rc_monitor* monitor;
+    callbacks.flow = still_flow;
+    callbacks.dimension = 5;
+    monitor = monitor_of(&callbacks, NULL);
+    CHECK_STATUS(RC_OK, rc_monitor_start(monitor, 0, five, NULL, 5, 0, 0.1, &verdict));
+    CHECK_STATUS(RC_OK, rc_monitor_save(monitor, bytes, &size));
+    CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+    for (dimension = 4; dimension <= 6; ++dimension) {
+        rc_monitor_options options = monitor_options();
+        callbacks.dimension = dimension;
+        options.backward = dimension == 5;
+        monitor = monitor_of(&callbacks, &options);
+        CHECK_STATUS(RC_INVALID, rc_monitor_restore(monitor, bytes, size));
+        CHECK(strstr(rc_last_error(), dimension == 5 ? "direction" : "components") != NULL);
+        CHECK(rc_monitor_state(monitor) == NULL);
+        CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+    }
+}
+
 int main(void)
 {
+    refuses_the_snapshot_of_another_dimension_or_direction();
     waits_for_a_start_after_one_has_failed();
     starts_again_after_a_wrong_bound();
     counts_flows_resteps_and_disabled_crossings();
