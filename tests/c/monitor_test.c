@@ -860,8 +860,24 @@ static void refuses_the_snapshot_of_another_dimension_or_direction(void)
     }
 }
 
+static void goes_on_from_a_snapshot_of_a_name_of_two_lines(void)
+{
+    static char bytes[1 << 12];
+    size_t size = sizeof bytes;
+    rc_callbacks callbacks = ball_callbacks();
+    rc_verdict verdict;
+    rc_monitor* monitor;
+    callbacks.name = "a ball\nand its floor";
+    monitor = monitor_of(&callbacks, NULL);
+    CHECK_STATUS(RC_OK, rc_monitor_start(monitor, 0, start, NULL, 2, 0, 0.1, &verdict));
+    CHECK_STATUS(RC_OK, rc_monitor_save(monitor, bytes, &size));
+    CHECK_STATUS(RC_OK, rc_monitor_restore(monitor, bytes, size));
+    CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+}
+
 int main(void)
 {
+    goes_on_from_a_snapshot_of_a_name_of_two_lines();
     refuses_the_snapshot_of_another_dimension_or_direction();
     waits_for_a_start_after_one_has_failed();
     starts_again_after_a_wrong_bound();
