@@ -60,7 +60,8 @@ class Guard:
         With ``lipschitz``, for ``detector="planned"``.
 
     In a class, ``guard`` turns a method into a guard, whose ``reset``, ``rest`` and further
-    functions are methods decorated with ``@name.reset`` and so on, like those of a ``property``.
+    functions are methods decorated with ``@name.reset`` and so on, like those of a ``property``,
+    but called as one likes.
     """
 
     def __init__(self, value=None, *, name=None, direction=-1, reset=None, rest=None, rate=None,
@@ -76,6 +77,7 @@ class Guard:
                              boolean=boolean, degree=degree, touch=touch, stop_after=stop_after,
                              lipschitz=lipschitz, resets=resets)
         self.name = name
+        self._origin = self  # shared by the guards that ``@name.reset`` and so on make of this one
 
     def __setattr__(self, name, value):
         if name in _OF_GUARDS:
@@ -91,7 +93,20 @@ class Guard:
         copy = Guard(name=self.name)
         copy._functions = {**self._functions, what: function}
         copy._numbers = dict(self._numbers)
+        copy._origin = self._origin
         return copy
+
+    def _joined(self, other):
+        """This guard with the functions that a decorated method of another name has added."""
+        out = self
+        for what, function in other._functions.items():
+            mine = self._functions[what]
+            if function is None or function is mine:
+                continue
+            if mine is not None:
+                raise TypeError(f"guard {self.name}: found two functions {what!r}, expected one")
+            out = out._with(what, function)
+        return out
 
     def rate(self, function):
         """Decorates the method that gives dg/dt along the flow."""
@@ -307,12 +322,22 @@ class System:
         for cls in reversed(type(self).__mro__):
             for name, member in vars(cls).items():
                 if isinstance(member, Guard):
+                    replaced = found.get(name, member)._origin
+                    if member._origin is not replaced and any(
+                            replaced is rest._origin for key, rest in found.items() if key != name):
+                        raise TypeError(f"{cls.__name__}: found another guard {name!r} in place of "
+                                        "one that methods of other names belong to, expected "
+                                        f"@{name}.reset and so on above methods called {name!r}")
                     found[name] = member
                 elif name in found:
                     raise TypeError(f"{cls.__name__}: found {name!r} in place of a guard of a base "
                                     "class, expected a guard: @ricochet.guard")
         self._refuse_unused(guards, found)
+        joined = {}
         for member in found.values():
+            key = id(member._origin)
+            joined[key] = joined[key]._joined(member) if key in joined else member
+        for member in joined.values():
             out.append(member._specification(len(out), self))
         for member in guards:
             if not isinstance(member, Guard):

@@ -543,3 +543,45 @@ def test_plain_numbers_and_arrays_give_the_same_run(options):
     assert np.array_equal(plain.x, other.x) and np.array_equal(plain.times, other.times)
     assert plain.events.tobytes() == other.events.tobytes()
     assert plain.statistics.steps == other.statistics.steps
+
+
+def test_functions_of_a_guard_may_have_names_of_their_own():
+    class Tank(ricochet.System):
+        def flow(self, t, x):
+            return [-1.0]
+
+        @ricochet.guard()
+        def low(self, t, x):
+            return x[0]
+
+        @low.reset
+        def refill(self, t, x):
+            return [x[0] + 1.5]
+
+        @low.enabled
+        def when(self, t, x):
+            return t < 2
+
+    class Half(Tank):
+        @Tank.refill.reset
+        def refill(self, t, x):
+            return [x[0] + 0.5]
+
+    class Lower(Tank):
+        @ricochet.guard()
+        def low(self, t, x):
+            return x[0] + 1
+
+    class Twice(Tank):
+        @Tank.refill.reset
+        def again(self, t, x):
+            return [x[0] + 0.5]
+
+    for system, times in ((Tank(), [1]), (Half(), [1, 1.5])):
+        run = ricochet.integrate(system, [1.0], 3.0)
+        assert run.guard_names == ["low"]
+        assert run.events["t"] == pytest.approx(times)
+    with pytest.raises(TypeError, match="Lower: found another guard 'low' in place of one that"):
+        ricochet.integrate(Lower(), [1.0], 3.0)
+    with pytest.raises(TypeError, match="guard low: found two functions 'reset', expected one"):
+        ricochet.integrate(Twice(), [1.0], 3.0)
