@@ -212,7 +212,7 @@ class System:
         A number, a sequence of names, or an Enum. Every function takes the mode before ``t``, as
         a number, name or member of the Enum, and a reset returns a mode, or a tuple (mode, x).
     guard_values(t, x) -> numbers
-        All guards at once, instead of their own functions.
+        All guards at once, instead of their own functions: ``guards=[Guard(name="low"), ...]``.
     reset_set(t, x, fired) -> x
         The reset of all guards that fired together, instead of their own: ``fired`` is a list of
         their numbers, with ``"time"`` at its end where a time event belongs to it.
@@ -389,6 +389,11 @@ class System:
             raise ValueError("time_reset: found one without time events, expected time_events or "
                              "next_time_event beside it")
         guards = self._guard_list()
+        if not guards and self.guard_values is not None:
+            raise ValueError("guard_values: found it without guards, expected one for each value: "
+                             "guards=[Guard(name=...), ...]")
+        if not guards and self.reset_set is not None and following is None:
+            raise ValueError("reset_set: found it without guards and time events, expected guards")
         flow = self.flow if self.formula is None else self._formulas(args, guards)
         source = _ricochet.callback_system(dict(
             name=self.name or type(self).__name__, flow=flow, args=args,

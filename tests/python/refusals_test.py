@@ -35,6 +35,16 @@ def test_a_time_reset_needs_time_events():
         ricochet.integrate(ricochet.System(decay, time_reset=lambda t, x: x), [1.0], 2.0)
 
 
+@pytest.mark.parametrize("members, words", [
+    ({"guard_values": lambda t, x: [x[0] - 0.5]}, r"guard_values: .* guards=\[Guard\(name=...\)"),
+    ({"reset_set": lambda t, x, fired: x}, "reset_set: found it without guards and time events")])
+def test_functions_of_guards_need_guards(members, words):
+    with pytest.raises(ValueError, match=words):
+        ricochet.integrate(ricochet.System(decay, **members), [1.0], 2.0)
+    members = dict(members, guards=[ricochet.Guard(lambda t, x: x[0] - 0.5, name="half")])
+    assert len(ricochet.integrate(ricochet.System(decay, **members), [1.0], 2.0).events) == 1
+
+
 def test_a_reset_returns_the_mode_before_the_state():
     system = ricochet.System(
         lambda mode, t, x: [-1.0],
