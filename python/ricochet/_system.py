@@ -2,6 +2,7 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator
+from functools import lru_cache
 from math import inf
 from numbers import Real
 from types import MethodType
@@ -188,6 +189,23 @@ def _plain_guard(function, index):
     return Guard(function)
 
 
+@lru_cache(maxsize=1024)  # every run asks for the attributes of its instance
+def _known_name_near(name, is_method):
+    if not is_method and name.removesuffix("s") in _KNOWN:
+        return []  # names of components, a count of resets
+    from difflib import get_close_matches
+    # A parameter may be called ``low`` or ``model``.
+    return get_close_matches(name.lower(), _KNOWN, 1, 0.8 if is_method else 0.86)
+
+
+def _refuse_near_name(cls, name, is_method):
+    meant = _known_name_near(name, is_method)
+    if meant:
+        what = "a method" if is_method else "an attribute"
+        raise TypeError(f"{cls.__name__}: found {what} {name!r}, expected {meant[0]!r}; if it means "
+                        "what it says, declare class ...(System, unchecked_names=True)")
+
+
 def _times(given):
     try:
         times = sorted(number_from(t, "time_events") for t in given)
@@ -266,13 +284,7 @@ class System:
         for name, member in vars(cls).items():
             if name.startswith("_") or name in _KNOWN or isinstance(member, Guard):
                 continue
-            if callable(member):
-                from difflib import get_close_matches
-                meant = get_close_matches(name.lower(), _KNOWN, 1, 0.8)
-                if meant:
-                    raise TypeError(f"{cls.__name__}: found a method {name!r}, expected "
-                                    f"{meant[0]!r}; if it means what it says, declare "
-                                    "class ...(System, unchecked_names=True)")
+            _refuse_near_name(cls, name, callable(member))
 
     def _mode_list(self):
         modes = self._read_again("modes")
@@ -280,6 +292,9 @@ class System:
             return None
         if isinstance(modes, int):
             return list(range(modes))
+        if isinstance(modes, str):
+            raise TypeError(f"modes: found {modes!r}, expected a number, a sequence of names or an "
+                            "Enum")
         return list(modes)
 
     def _read_again(self, name):
@@ -296,6 +311,8 @@ class System:
         """Rejects guards and resets that no run would use."""
         who = type(self).__name__
         for name, member in vars(self).items():
+            if name not in _KNOWN and not name.startswith("_") and not self._unchecked_names:
+                _refuse_near_name(type(self), name, False)
             if name in found:
                 raise TypeError(f"{who}: found an attribute {name!r} of an instance in place of a "
                                 "guard of its class, expected another class")
@@ -303,7 +320,7 @@ class System:
                 raise TypeError(f"{who}: found the guard {name!r} as an attribute of an instance, "
                                 "expected it in the class or in guards")
         if getattr(self, "guard", None) is None and not self._unchecked_names:
-            for name in ("reset", "rest", "guard_rate"):
+            for name in ("reset", "rest", "guard_rate", "unilateral", "direction"):
                 if getattr(self, name, None) is not None:
                     raise TypeError(f"{who}: found {name!r} without a method guard, expected that "
                                     "of a Guard")
@@ -392,8 +409,8 @@ class System:
         if not guards and self.guard_values is not None:
             raise ValueError("guard_values: found it without guards, expected one for each value: "
                              "guards=[Guard(name=...), ...]")
-        if not guards and self.reset_set is not None and following is None:
-            raise ValueError("reset_set: found it without guards and time events, expected guards")
+        if not guards and self.reset_set is not None:
+            raise ValueError("reset_set: found it without guards, expected some, or a time_reset")
         flow = self.flow if self.formula is None else self._formulas(args, guards)
         source = _ricochet.callback_system(dict(
             name=self.name or type(self).__name__, flow=flow, args=args,

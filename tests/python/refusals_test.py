@@ -37,12 +37,46 @@ def test_a_time_reset_needs_time_events():
 
 @pytest.mark.parametrize("members, words", [
     ({"guard_values": lambda t, x: [x[0] - 0.5]}, r"guard_values: .* guards=\[Guard\(name=...\)"),
-    ({"reset_set": lambda t, x, fired: x}, "reset_set: found it without guards and time events")])
+    ({"reset_set": lambda t, x, fired: x}, "reset_set: found it without guards, expected some, or"),
+    ({"reset_set": lambda t, x, fired: x, "time_events": [1.0]}, "reset_set: found it without")])
 def test_functions_of_guards_need_guards(members, words):
     with pytest.raises(ValueError, match=words):
         ricochet.integrate(ricochet.System(decay, **members), [1.0], 2.0)
     members = dict(members, guards=[ricochet.Guard(lambda t, x: x[0] - 0.5, name="half")])
-    assert len(ricochet.integrate(ricochet.System(decay, **members), [1.0], 2.0).events) == 1
+    assert "half" in ricochet.integrate(ricochet.System(decay, **members), [1.0], 2.0).guard_names
+
+
+@pytest.mark.parametrize("name, meant", [
+    ("unilatral", "unilateral"), ("time_event", "time_events"), ("mode", "modes")])
+def test_attributes_that_are_misspelt(name, meant):
+    words = f"Named: found an attribute {name!r}, expected {meant!r}; if it means what it says"
+    with pytest.raises(TypeError, match=words):
+        type("Named", (ricochet.System,), {name: 1})
+
+    class Named(ricochet.System):
+        low, model, names, resets = 18.0, None, ["height"], 0
+
+        def flow(self, t, x):
+            return -x
+
+    system = Named()
+    assert ricochet.integrate(system, [1.0], 1.0).success
+    setattr(system, name, 1)
+    with pytest.raises(TypeError, match=words):
+        ricochet.integrate(system, [1.0], 1.0)
+    Named._unchecked_names = True
+    assert ricochet.integrate(system, [1.0], 1.0).success
+
+
+@pytest.mark.parametrize("name, value", [("unilateral", True), ("direction", 1)])
+def test_attributes_of_a_guard_need_the_method_guard(name, value):
+    with pytest.raises(TypeError, match=f"found '{name}' without a method guard"):
+        ricochet.integrate(ricochet.System(decay, **{name: value}), [1.0], 1.0)
+
+
+def test_modes_are_not_letters():
+    with pytest.raises(TypeError, match="modes: found 'on', expected a number, a sequence of"):
+        ricochet.integrate(ricochet.System(lambda mode, t, x: -x, modes="on"), [1.0], 1.0)
 
 
 def test_a_reset_returns_the_mode_before_the_state():
