@@ -664,6 +664,18 @@ TEST(Events, ABooleanGuardIsBisected)
     EXPECT_NEAR(run.events[1].t, 2 * std::sqrt(2.0), 1e-15);
 }
 
+TEST(Events, AGuardOfIntegersIsANumber)
+{
+    struct Inside {
+        void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+        [[nodiscard]] int guard(double, const X1& x) const { return x[0] * x[0] < 2 ? 1 : -1; }
+    };
+    const auto run = integrate(Inside{}, X1{0}, {.t_end = 3});
+    ASSERT_EQ(run.events.size(), 1u);
+    EXPECT_NEAR(run.events[0].t, std::sqrt(2.0), 5e-16);
+    EXPECT_EQ(run.events[0].kind, EventKind::jump);
+}
+
 TEST(Events, BooleanGuardsAreKnownInEveryForm)
 {
     // From 0 at unit speed to the square root of 2, again and again; a crossing, not a jump.

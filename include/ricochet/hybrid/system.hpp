@@ -431,6 +431,8 @@ template <class System, class X>
 
 [[nodiscard]] constexpr double as_guard_value(bool inside) noexcept { return inside ? 1 : -1; }
 [[nodiscard]] constexpr double as_guard_value(double g) noexcept { return g; }
+template <std::integral Number>
+[[nodiscard]] constexpr double as_guard_value(Number g) noexcept { return static_cast<double>(g); }
 
 /// Value of one guard. X may be a view.
 template <class System, class X>
