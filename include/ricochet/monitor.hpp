@@ -17,11 +17,14 @@
 // first set of events, its resets, the arming of all guards with the flow after them.
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <limits>
 #include <memory>
 #include <span>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 #include "ricochet/detail/declarations.hpp"
@@ -98,6 +101,19 @@ constexpr bool check_host_step()
         "ricochet: found a step with a restep that does not fit; expected void restep(double s, "
         "std::span<double> x) const");
     return true;
+}
+
+/// @throws std::invalid_argument naming a component of `what` that is NaN or infinite.
+inline void require_finite(const char* what, std::span<const double> x)
+{
+    bool finite = true;
+    for (const double at : x) finite &= at - at == 0;
+    if (finite) return;
+    std::size_t which = 0;
+    while (std::isfinite(x[which])) ++which;
+    throw std::invalid_argument(std::string("EventMonitor: ") + what + " must be finite, got " +
+                                std::to_string(x[which]) + " in component " +
+                                std::to_string(which));
 }
 
 }  // namespace detail
@@ -227,12 +243,13 @@ public:
     /// changed the state. May return a cut immediately, for a guard that is about to be crossed.
     /// @param dxdt   the rate at x in offsets, n doubles
     /// @param scale  [s] approximate length of the next step
-    /// @throws std::invalid_argument for a time, state, scale or guard that is not finite, an array
-    /// of the wrong size, an unknown mode, or a state behind a surface that bounds the motion.
+    /// @throws std::invalid_argument for a time, state, rate, scale or guard that is not finite, an
+    /// array of the wrong size, an unknown mode, or a state behind a surface that bounds the
+    /// motion.
     Verdict start(const Instant& t, std::span<const double> x, std::span<const double> dxdt,
                   double scale, Mode mode = 0)
     {
-        return monitor_->start(t, taken(x), checked(dxdt, x.size()), mode, scale);
+        return monitor_->start(t, taken(x), finite("dxdt", dxdt, x.size()), mode, scale);
     }
     /// The same, with the rate of the system's flow.
     Verdict start(const Instant& t, std::span<const double> x, double scale, Mode mode = 0)
@@ -241,6 +258,8 @@ public:
     }
 
     /// Looks for events in the next step.
+    /// @throws std::invalid_argument for a length that is not above zero, and for a number of x1 or
+    /// a rate that is not finite; nothing has changed then
     /// @throws std::domain_error where an event is located on states of the host's `restep` or
     /// `interpolate` that are not finite
     /// @throws std::logic_error for a step out of turn: one that does not start where the last one
@@ -254,9 +273,9 @@ public:
         detail::HostStepTable table{.t = start.value,
                                     .h = step.h(),
                                     .x0 = checked(step.x0(), n),
-                                    .x1 = checked(step.x1(), n),
-                                    .rate0 = checked(step.rate0(), n),
-                                    .rate1 = checked(step.rate1(), n),
+                                    .x1 = finite("x1", step.x1(), n),
+                                    .rate0 = finite("rate0", step.rate0(), n),
+                                    .rate1 = finite("rate1", step.rate1(), n),
                                     .host = &step,
                                     .interpolate = &interpolate<S>,
                                     .t_remainder = start.remainder,
@@ -271,7 +290,7 @@ public:
     /// their surfaces, or for a motion that comes to rest.
     [[nodiscard]] Verdict resume(std::span<const double> dxdt, double scale)
     {
-        return monitor_->resume(checked(dxdt, monitor_->x().size()), scale);
+        return monitor_->resume(finite("dxdt", dxdt, monitor_->x().size()), scale);
     }
     /// The same, with the rate of the system's flow.
     [[nodiscard]] Verdict resume(double scale) { return monitor_->resume(nullptr, scale); }
@@ -279,7 +298,7 @@ public:
     [[nodiscard]] Verdict resume(std::span<const double> after, Mode mode,
                                  std::span<const double> dxdt, double scale)
     {
-        return monitor_->resume(taken(after), mode, checked(dxdt, after.size()), scale);
+        return monitor_->resume(taken(after), mode, finite("dxdt", dxdt, after.size()), scale);
     }
 
     /// Tells the monitor that the state has been kept until t [s], at most `must_stop_at`. Returns
@@ -306,7 +325,7 @@ public:
     /// @throws std::logic_error if t lies beyond that
     void skip_to(const Instant& t, std::span<const double> x, std::span<const double> dxdt)
     {
-        monitor_->skip_to(t, taken(x), checked(dxdt, x.size()));
+        monitor_->skip_to(t, taken(x), finite("dxdt", dxdt, x.size()));
     }
 
     /// The side of its surface that a guard is on.
@@ -411,6 +430,14 @@ private:
     [[nodiscard]] static const double* checked(std::span<const double> x, std::size_t n)
     {
         if (x.size() != n) detail::throw_wrong_size(n, x.size());
+        return x.data();
+    }
+
+    [[nodiscard]] static const double* finite(const char* what, std::span<const double> x,
+                                              std::size_t n)
+    {
+        (void)checked(x, n);
+        detail::require_finite(what, x);
         return x.data();
     }
 

@@ -1,14 +1,14 @@
 """Events of a motion that another integrator computes."""
 
-from enum import IntEnum
 from typing import NamedTuple
 
 from . import _ricochet
 from ._network import set_gate
-from ._run import set_mode, source_of, state_from
+from ._numbers import meant_by
+from ._run import Named, set_mode, source_of, state_from
 
 
-class Verdict(IntEnum):
+class Verdict(Named):
     """The next action of a host."""
 
     STANDS = 0  #: the step stands: continue from its end
@@ -80,10 +80,11 @@ class Monitor(_ricochet.Monitor):
     """
 
     def __init__(self, system, like, *, backward=False, cut_at_all=False, **options):
+        """Arguments are those of the class."""
         for name in options:
             if name not in _OPTIONS + _FORMER:
-                raise TypeError(f"Monitor: found an option {name!r}, expected some of backward, "
-                                "cut_at_all, " + ", ".join(_OPTIONS))
+                raise TypeError(f"Monitor: found an option {name!r}, expected some of "
+                                + meant_by(name, ("backward", "cut_at_all") + _OPTIONS))
         set_gate(options)
         source, modes = source_of(system)
         self._system, self._mode_list = system, modes
@@ -113,8 +114,8 @@ class Monitor(_ricochet.Monitor):
         """Looks for events in the next step, from ``t0`` over the length ``h``, above zero.
 
         ``x0`` and ``x1`` are the states at its ends, ``rate0`` and ``rate1`` the values of dx/dt
-        there. ``interpolate(t)`` returns the state at a time within the step, like SciPy's dense
-        output; the default is the cubic through these four.
+        there. ``interpolate(t)`` returns the state at a time from ``t0`` to ``t0 + h``, like SciPy's
+        dense output; the default is the cubic through these four.
         """
         return _VERDICTS[self._examine(t0, h, x0, x1, rate0, rate1, interpolate)]
 
@@ -136,5 +137,5 @@ class Monitor(_ricochet.Monitor):
 
     @property
     def cut(self):
-        """The last set of events that has ended a step, as a `Cut`."""
+        """The last set of events that has ended a step, as a `Cut`; before one, a RuntimeError."""
         return Cut(*self._cut())

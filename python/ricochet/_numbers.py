@@ -46,6 +46,13 @@ def numbers_from(given, what):
         raise TypeError(f"{what}: found {given!r}, expected numbers") from None
 
 
+def meant_by(name, known):
+    """All names, and the one that a misspelt one resembles: the end of a sentence."""
+    from difflib import get_close_matches
+    near = get_close_matches(str(name), known, 1)
+    return ", ".join(known) + (f"; did you mean {near[0]!r}?" if near else "")
+
+
 def number_from(given, what):
     """A float."""
     if type(given) is float:

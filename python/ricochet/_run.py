@@ -11,7 +11,17 @@ from ._ready import Ready
 from ._system import System
 
 
-class Kind(IntEnum):
+class Named(IntEnum):
+    """A number that is printed by its name."""
+
+    def __str__(self):
+        return self.name
+
+    def __format__(self, specification):
+        return int.__format__(self, specification) if specification else self.name
+
+
+class Kind(Named):
     """Kind of an event: the field ``kind`` of ``run.events``."""
 
     CROSSING = 0      #: the guard changed sign
@@ -75,7 +85,10 @@ def prepare(system, x0, t_end, options, args=None):
         set_tolerance(options, options["atol"], len(x0))
     samples = options.get("sample_times")
     if samples is not None:
-        options["sample_times"] = numbers_from(samples, "sample_times").ravel().tolist()
+        samples = numbers_from(samples, "sample_times")
+        if samples.ndim > 1:
+            raise ValueError(f"sample_times: found {samples.ndim} dimensions, expected 1")
+        options["sample_times"] = samples.ravel().tolist()
     else:
         options.pop("sample_times", None)
     if options.pop("record_steps", False):

@@ -234,6 +234,9 @@ def shown(monitor, t0=0.0, h=0.1, x0=(1.0, 0.0), x1=None, rate0=(0.0, -9.81), ra
     ({"h": -0.1}, ValueError, "above 0"), ({"h": math.nan}, ValueError, "above 0"),
     ({"x0": (1.0,)}, ValueError, r"x0: found shape \(1,\), expected \(2,\)"),
     ({"x1": [[1.0, 0.0]]}, ValueError, r"x1: found shape \(1, 2\)"),
+    ({"x1": [math.nan, 0.0]}, ValueError, "x1 must be finite, got nan in component 0"),
+    ({"rate0": [0.0, math.inf]}, ValueError, "rate0 must be finite, got inf in component 1"),
+    ({"rate1": [math.nan, 0.0]}, ValueError, "rate1 must be finite, got nan in component 0"),
     ({"rate0": [1.0] * 3}, ValueError, "rate0: found shape"),
     ({"rate1": 3.0}, ValueError, "rate1: found shape"), ({"x1": None, "interpolate": 3}, TypeError,
                                                          "interpolate: found a int"),
@@ -274,6 +277,9 @@ def test_calls_out_of_turn():
     (lambda: started().start(0.0, [math.nan, 0.0], 0.1), ValueError, "finite|nan"),
     (lambda: started().start(0.0, [1.0, 0.0], 0.0), ValueError, "scale"),
     (lambda: started().start(0.0, [1.0, 0.0], 0.1, [1.0]), ValueError, "rate: found shape"),
+    (lambda: started().start(0.0, [1.0, 0.0], 0.1, [0.0, math.nan]), ValueError,
+     "rate must be finite, got nan in component 1"),
+    (lambda: started().cut, RuntimeError, "cut: found no set of events since the start"),
     (lambda: started().start(0.0, [1.0], 0.1), ValueError, r"x: found shape \(1,\), expected"),
     (lambda: started().start(0.0, [1.0, 0.0, 0.0], 0.1), ValueError, r"x: found shape \(3,\)"),
     (lambda: Monitor(ricochet.StickSlip(), [1.0, 0.2]).start(0.0, [1.0], 0.1), ValueError,
@@ -349,3 +355,33 @@ def test_one_caller_at_a_time():
     leave.set()
     thread.join()
     assert monitor.t == 0.1
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_an_interpolant_of_offsets_is_refused(backward):
+    sign = -1 if backward else 1
+
+    def height(s):  # at the offset s from the start
+        return [1 - s, -1.0 * sign]
+
+    system = ricochet.System(lambda t, x: [x[1], 0.0],
+                             [ricochet.Guard(lambda t, x: x[0] - 0.25, name="low")])
+    for of_offsets in False, True:
+        monitor = Monitor(system, [1.0, 0.0], backward=backward, cut_at_all=True)
+        monitor.start(sign * 5.0, height(0), 0.5)
+
+        def show(k):
+            t0, s0 = sign * (5.0 + 0.5 * k), 0.5 * k
+            path = (lambda s: height(s0 + s)) if of_offsets else (
+                lambda t: height(s0 + sign * (t - t0)))
+            rate = [-1.0 * sign, 0.0]
+            return monitor.examine(t0, 0.5, height(s0), height(s0 + 0.5), rate, rate, path)
+
+        if of_offsets:
+            with pytest.raises(ValueError, match="interpolate: found the state as a function of "
+                                                 "the offset from t0, expected a function of the"):
+                [show(k) for k in range(2)]
+        else:
+            assert [show(k) for k in range(2)] == [Verdict.STANDS, Verdict.CUT]
+            assert monitor.cut.t == pytest.approx(sign * 5.75)
+            assert f"{Verdict.CUT} {Verdict.CUT:d}" == "CUT 1" and str(ricochet.Kind.TIME) == "TIME"

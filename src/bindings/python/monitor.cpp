@@ -31,15 +31,48 @@ using Given = py::array_t<double, py::array::c_style | py::array::forcecast>;
 /// A step of a host: its interpolant is a function of the time.
 struct ShownStep {
     PyObject* interpolate;
-    double t0;
+    const detail::HostStepTable& shown;
     double sign;  ///< of the direction in which time runs
+    mutable bool is_checked = false;
 
     static void at(const void* step, double s, double* x, std::size_t n)
     {
-        static const std::string no_guard;
         const auto& self = *static_cast<const ShownStep*>(step);
-        const Ref time = checked(PyFloat_FromDouble(self.t0 + self.sign * s));
-        const Ref result = checked(PyObject_CallOneArg(self.interpolate, time.get()));
+        if (!std::exchange(self.is_checked, true)) self.refuse_offsets(n);
+        self.at_time(self.shown.t + self.sign * s, x, n);
+    }
+
+    /// Refuses a function of the offset, as the interpolants of C++ and C are: one that misses x0
+    /// at the time t0 and meets x0 and x1 at the times 0 and h.
+    void refuse_offsets(std::size_t n) const
+    {
+        State x(n);
+        const auto distance = [&](double t, const double* from) {
+            at_time(t, x.data(), n);
+            double sum = 0;
+            for (std::size_t i = 0; i < n; ++i) sum += std::fabs(x[i] - from[i]);
+            return sum;
+        };
+        double moved = 0;
+        for (std::size_t i = 0; i < n; ++i) moved += std::fabs(shown.x1[i] - shown.x0[i]);
+        const double missed = distance(shown.t, shown.x0);
+        if (!(missed > 0.01 * moved)) return;
+        try {
+            if (!(distance(0, shown.x0) + distance(shown.h, shown.x1) < 1e-6 * missed)) return;
+        } catch (const PythonError& error) {  // of a function that is asked outside its step
+            if (PyErr_GivenExceptionMatches(error.value(), PyExc_Exception)) return;
+            throw;
+        }
+        raise(PyExc_ValueError,
+              "interpolate: found the state as a function of the offset from t0, expected a "
+              "function of the time");
+    }
+
+    void at_time(double t, double* x, std::size_t n) const
+    {
+        static const std::string no_guard;
+        const Ref time = checked(PyFloat_FromDouble(t));
+        const Ref result = checked(PyObject_CallOneArg(interpolate, time.get()));
         const Numbers numbers(result.get(), "interpolate", no_guard);
         if (numbers.size() != n) {
             raise(PyExc_ValueError, "interpolate returned " + std::to_string(numbers.size()) +
@@ -96,7 +129,10 @@ public:
             require_dimension("x", x);
             const State state = state_from(x);
             const std::optional<State> dxdt = rate_from("rate", rate, state.size());
-            return monitor_->start(Instant{t}, state, dxdt ? dxdt->data() : nullptr, in, scale);
+            const Verdict verdict =
+                monitor_->start(Instant{t}, state, dxdt ? dxdt->data() : nullptr, in, scale);
+            has_cut_ = false;
+            return verdict;
         });
     }
 
@@ -108,7 +144,13 @@ public:
             const std::size_t n = monitor_->x().size();
             const Given* const arrays[] = {&x0, &x1, &rate0, &rate1};
             const char* const names[] = {"x0", "x1", "rate0", "rate1"};
-            for (std::size_t i = 0; i < 4; ++i) require_size(names[i], *arrays[i], n);
+            for (std::size_t i = 0; i < 4; ++i) {
+                require_size(names[i], *arrays[i], n);
+                // States at the end of no length are none; the monitor refuses the length.
+                if (i > 0 && std::isfinite(h)) {
+                    detail::require_finite(names[i], {arrays[i]->data(), n});
+                }
+            }
             const auto along = [&](const Given& rate, State& room) {
                 if (sign_ > 0) return rate.data();
                 room.assign(rate.data(), rate.data() + n);
@@ -134,7 +176,7 @@ public:
                 throw py::type_error("interpolate: found a " + type_of(interpolate.ptr()) +
                                      ", expected a function of the time, or None");
             }
-            const ShownStep step{interpolate.ptr(), t0, sign_};
+            const ShownStep step{interpolate.ptr(), table, sign_};
             table.host = &step;
             table.interpolate = &ShownStep::at;
             return monitor_->examine(table);
@@ -178,6 +220,10 @@ public:
     [[nodiscard]] py::tuple cut()
     {
         const Turn turn = take_turn();
+        if (!has_cut_) {
+            throw std::runtime_error(
+                "cut: found no set of events since the start, expected a Verdict.CUT before");
+        }
         const Cut<State>& cut = monitor_->cut();
         py::list fired_names;
         for (const std::size_t which : cut.fired) fired_names.append(names_.guard_names[which]);
@@ -231,7 +277,7 @@ public:
     {
         const Turn turn = take_turn();
         monitor_->restore(snapshot);
-        ended_ = false;
+        ended_ = has_cut_ = false;
     }
 
 private:
@@ -245,6 +291,7 @@ private:
         try {
             const Verdict verdict = work();
             ended_ = verdict == Verdict::ended;
+            has_cut_ = has_cut_ || verdict == Verdict::cut;
             if (const auto raised = door_->watch().take_raised()) raise_with(*raised, record());
             return verdict;
         } catch (const PythonError& error) {
@@ -300,6 +347,7 @@ private:
         if (given.is_none()) return std::nullopt;
         const auto rate = py::cast<Given>(given);
         require_size(name, rate, n);
+        detail::require_finite(name, {rate.data(), n});
         State out(rate.data(), rate.data() + n);
         for (double& r : out) r *= sign_;
         return out;
@@ -316,6 +364,7 @@ private:
     std::unique_ptr<detail::AnyMonitor<State>> monitor_;
     std::array<State, 2> rates_;
     bool ended_ = false;
+    bool has_cut_ = false;  ///< since the start
     std::atomic<bool> in_use_ = false;
 };
 
