@@ -15,6 +15,11 @@ static int any_reset_set(void* user, const size_t* fired, size_t count, int on_t
     (void)user, (void)fired, (void)count, (void)on_time, (void)mode, (void)t, (void)x, (void)n;
     return 1;
 }
+static int any_rest(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)x, (void)n;
+    return 1;
+}
 static int any_time_reset(void* user, rc_mode* mode, double t, double* x, size_t n)
 {
     (void)user, (void)mode, (void)t, (void)x, (void)n;
@@ -46,6 +51,7 @@ static void refuses_systems_that_are_none(void)
     CHECK_SYSTEM(callbacks.guard_count = 0, "guard_count");
     CHECK_SYSTEM((callbacks.guard_count = 0, callbacks.guard = NULL), "guard_count");
     CHECK_SYSTEM(callbacks.reset_set = any_reset_set, "reset_set");
+    CHECK_SYSTEM((callbacks.reset = NULL, callbacks.rest = any_rest), "rest without a reset");
     CHECK_SYSTEM(callbacks.time_reset = any_time_reset, "next_time_event");
     CHECK_SYSTEM(callbacks.previous_time_event = any_time, "next_time_event");
     CHECK_SYSTEM(callbacks.lower_bound = ball_guard, "speed_bound");

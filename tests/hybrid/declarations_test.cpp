@@ -310,6 +310,13 @@ struct RestWithoutMode : FallingOntoFloor {
         x[1] = 0;
     }
 };
+struct RestWithoutReset : FallingOntoFloor {
+    template <class V>
+    void rest(double, V& x) const
+    {
+        x[1] = 0;
+    }
+};
 struct RestOfCopy : FallingOntoFloor {
     void rest(double, X) const {}
 };
@@ -327,6 +334,7 @@ TEST(Declarations, AResetThatDoesNotFitIsKnown)
     EXPECT_EQ((detail::reset_declaration<ResetOfNothing, X>()), Declaration::does_not_fit);
     EXPECT_EQ((detail::rest_declaration<RestWithoutWhich, X>()), Declaration::does_not_fit);
     EXPECT_EQ((detail::rest_declaration<RestWithoutMode, X>()), Declaration::does_not_fit);
+    EXPECT_EQ((detail::rest_declaration<RestWithoutReset, X>()), Declaration::does_not_fit);
     EXPECT_EQ((detail::rest_declaration<RestOfCopy, X>()), Declaration::by_value);
 }
 

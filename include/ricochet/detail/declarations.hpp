@@ -332,10 +332,11 @@ template <class System, class X>
     }
 }
 
+/// Without reset the function would never be called, and does not fit.
 template <class System, class X>
 [[nodiscard]] constexpr Declaration rest_declaration() noexcept
 {
-    if constexpr (refuses_guards<System, X>()) {
+    if constexpr (refuses_guards<System, X>() || is_refused<Name_reset, System, X>(reset_declaration<System, X>())) {
         return Declaration::absent;
     } else if constexpr (!Resting<System, X>) {
         return unfit<Name_rest, System, X>();
@@ -344,6 +345,8 @@ template <class System, class X>
                          (ModedSingleRest<System, X> && Name_rest::takes<const System, Mode, double, X>) ||
                          (ModedRestOf<System, X> && Name_rest::takes<const System, std::size_t, Mode, double, X>)) {
         return Declaration::by_value;
+    } else if constexpr (!Resetting<System, X>) {
+        return Declaration::does_not_fit;
     } else {
         return told_apart<Name_rest, System, X, PlainRestOf<System, X> && !ModedRestOf<System, X>,
                           ModedSingleRest<System, X>, double, X&>();
@@ -514,7 +517,7 @@ constexpr bool check_declarations()
     RICOCHET_CHECK(reset, "void reset([std::size_t which,] double t, State& x) const, or Mode reset([std::size_t which,] Mode, double t, State& x) const, "
                           "or with const FiredGuards& for `which`; `which` if and only if there is a guard_count; and a guard")
     RICOCHET_CHECK(rest, "void rest([std::size_t which,] double t, State& x) const, or Mode rest([std::size_t which,] Mode, double t, State& x) const, "
-                         "with `which` if and only if there is a guard_count; and a guard")
+                         "with `which` if and only if there is a guard_count; and a guard and a reset")
     RICOCHET_CHECK(enabled, "bool enabled([std::size_t which,] Mode) const, or bool enabled([std::size_t which,] [Mode,] double t, const State& x) const, "
                             "with `which` if and only if there is a guard_count")
     RICOCHET_CHECK(next_time_event, "double next_time_event(double t) const")

@@ -38,6 +38,7 @@ void check(const rc_callbacks& has)
             "found a callback of guards with a guard_count of 0");
     require(!(has.reset && has.reset_set),
             "found both `reset` and `reset_set`; expected one of them");
+    require(!has.rest || has.reset || has.reset_set, "found a rest without a reset");
     require(!has.time_reset || has.next_time_event, "found a time_reset without a next_time_event");
     require(!has.previous_time_event || has.next_time_event,
             "found a previous_time_event without a next_time_event");

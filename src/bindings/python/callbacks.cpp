@@ -165,9 +165,11 @@ void CallbackSource::read_guard(PyObject* specification)
     if (!guard.value && !guard_values_) {
         raise(PyExc_TypeError, guard.title + ": found None, expected a function");
     }
+    if (guard.rest && !guard.reset && !reset_set_) {
+        raise(PyExc_ValueError, guard.title + ": found a rest without a reset, expected both");
+    }
     const double direction = number_in(specification, "direction", 0);
     guard.info = {
-        // One without a name is called by its number.
         .name = guard.name == std::to_string(guards_.size() - 1) ? std::string_view()
                                                                  : std::string_view(guard.name),
         .crossing = direction < 0   ? Crossing::falling
