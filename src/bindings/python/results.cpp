@@ -290,6 +290,18 @@ void bind_results(py::module_& module)
             "message",
             [](const PyRun& self) {
                 std::string out(describe(self.record.outcome));
+                if (self.record.outcome == Outcome::conflicting_resets) {
+                    constexpr std::string_view in_cpp = "reset(fired, t, x)";
+                    if (const auto at = out.find(in_cpp); at != std::string::npos) {
+                        out.replace(at, in_cpp.size(), "reset_set(t, x, fired)");
+                    }
+                    const auto named = [&](std::int64_t guard) {
+                        const auto which = static_cast<std::size_t>(guard);
+                        return which < self.guard_names.size() ? self.guard_names[which]
+                                                               : "a time event";
+                    };
+                    out += ": " + named(self.record.guard) + ", " + named(self.record.other_guard);
+                }
                 if (!self.record.wrong_bound.empty()) out += ": " + self.record.wrong_bound;
                 return out;
             },
@@ -324,10 +336,12 @@ void bind_results(py::module_& module)
         .def_property_readonly(
             "other_guard",
             [](const PyRun& self) -> py::object {
+                constexpr auto on_time = static_cast<std::int64_t>(time_event_reset);
+                if (self.record.other_guard == on_time) return py::int_(-1);
                 if (self.record.other_guard < 0) return py::none();
                 return py::int_(self.record.other_guard);
             },
-            "Of two conflicting resets the second, or None.")
+            "The guard of the second of two conflicting resets, -1 for a time event, or None.")
         .def_readonly("modes", &PyRun::modes, "What the modes are called, or None.")
         .def_readonly("guard_names", &PyRun::guard_names, "What the guards are called.")
         .def_property_readonly(
