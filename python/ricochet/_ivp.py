@@ -9,6 +9,7 @@ from . import _ricochet
 from ._compiled import Compiled
 from ._network import set_gate
 from ._ready import Ready
+from ._numbers import meant_by
 from ._run import Kind, number_from, numbers_from, set_mode, set_tolerance, source_of, state_from
 from ._system import MOST_EVENTS, Guard, System
 
@@ -262,7 +263,7 @@ def _options(options, t0, t1, components):
     for name in options:
         if name not in known:
             raise TypeError(f"solve_ivp: found an option {name!r}, expected some of "
-                            + ", ".join(_ARGUMENTS + tuple(known)))
+                            + meant_by(name, _ARGUMENTS + tuple(known)))
     given.update(options)
     set_gate(given)
     return given
@@ -313,10 +314,10 @@ def _guards(events, t0, start, args):
         if unilateral and direction == 0:
             direction = -1
         name = getattr(event, "name", None) or getattr(event, "__name__", None)
-        guard = Guard(event, name=name if isinstance(name, str) else None, direction=direction,
-                      reset=reset, rest=getattr(event, "rest", None),
-                      rate=getattr(event, "rate", None), unilateral=unilateral,
-                      stop_after=int(terminal))
+        guard = Guard(event, name=name if isinstance(name, str) else None,
+                      direction=float(np.sign(direction)), reset=reset,
+                      rest=getattr(event, "rest", None), rate=getattr(event, "rate", None),
+                      unilateral=unilateral, stop_after=int(terminal))
         specification = guard._specification(index)
         own = specification["name"]
         specification["title"] = who if own == str(index) else f"{who} ({own})"

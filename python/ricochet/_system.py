@@ -10,7 +10,7 @@ from types import MethodType
 from . import _ricochet
 from ._compiled import Compiled
 from ._formula import Formula
-from ._numbers import number_from
+from ._numbers import meant_by, number_from
 
 #: The largest number of events after which a guard can end the run.
 MOST_EVENTS = 2**32 - 1
@@ -160,8 +160,9 @@ class Guard:
                     out[what] != int(out[what])):
                 raise ValueError(f"guard {out['name']}: {what}: found {out[what]!r}, expected a "
                                  f"whole number that is not negative, and at most {most}")
-        if out["direction"] != out["direction"]:
-            raise ValueError(f"guard {out['name']}: direction: found nan, expected -1, 0 or 1")
+        if not isinstance(out["direction"], Real) or out["direction"] not in (-1, 0, 1):
+            raise ValueError(f"guard {out['name']}: direction: found {out['direction']!r}, expected "
+                             "-1, 0 or 1")
         return out
 
     def __repr__(self):
@@ -273,7 +274,7 @@ class System:
         for name, value in members.items():
             if name not in _KNOWN:
                 raise TypeError(f"System: found a member {name!r}, expected some of "
-                                + ", ".join(_KNOWN))
+                                + meant_by(name, _KNOWN))
             setattr(self, name, value)
 
     def __init_subclass__(cls, unchecked_names=False, **options):
@@ -328,7 +329,13 @@ class System:
     def _guard_list(self):
         out = []
         guards = self._read_again("guards")
+        if isinstance(guards, (Guard, Compiled)) or callable(guards):
+            raise TypeError(f"guards: found a {type(guards).__name__}, expected a sequence: "
+                            "guards=[...]")
         if getattr(self, "guard", None) is not None:
+            if isinstance(self.guard, (Guard, list, tuple)):
+                raise TypeError(f"guard: found a {type(self.guard).__name__}, expected a function, "
+                                "or guards=[...]")
             single = Guard(self.guard, name="guard", reset=getattr(self, "reset", None),
                            rest=getattr(self, "rest", None),
                            rate=getattr(self, "guard_rate", None),
@@ -385,9 +392,26 @@ class System:
             raise TypeError("flow: found a compiled function beside formula")
         return Formula(self.flow, components, modes, args, "flow", True)
 
+    def _refuse_arguments(self, args):
+        """Rejects a flow with a mode in a system without modes, and the reverse."""
+        function = getattr(self.flow, "__func__", self.flow)
+        code = getattr(function, "__code__", None)
+        if code is None or code.co_flags & 4:  # not written in Python, or with *arguments
+            return
+        least = code.co_argcount - len(function.__defaults__ or ())
+        given = 2 + (self.modes is not None) + len(args or ()) + (function is not self.flow)
+        if not least <= given <= code.co_argcount:
+            found = ", ".join(code.co_varnames[:code.co_argcount])
+            why = "without modes" if self.modes is None else "with modes"
+            mode = "" if self.modes is None else "mode, "
+            more = ", ..." if args else ""
+            raise TypeError(f"{type(self).__name__}: found flow({found}) in a system {why}, expected "
+                            f"flow({mode}t, x{more})")
+
     def _source(self, args=None):
         if not callable(self.flow) and not isinstance(self.flow, Compiled):
             raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
+        self._refuse_arguments(args)
         following, preceding = self.next_time_event, self.previous_time_event
         if self.time_events is not None:
             times = _times(self._read_again("time_events"))

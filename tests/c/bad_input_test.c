@@ -119,6 +119,7 @@ static void refuses_options_that_are_none(void)
     CHECK_OPTION(options.method = -1, "method");
     CHECK_OPTION(options.method = RC_TAYLOR, "expected RC_FEHLBERG78");
     CHECK_OPTION(options.method = RC_RK4, "error");
+    CHECK_OPTION(options.method = RC_EULER, "expected fixed_step = 1 and a step, or RC_DOPRI5");
     CHECK_OPTION(options.detector = 7, "detector");
     CHECK_OPTION(options.detector = INT_MIN, "detector");
     CHECK_OPTION(options.locator = 3, "locator");

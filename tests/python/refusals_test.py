@@ -518,6 +518,8 @@ def test_integers_above_all_floats(given):
     ({"stop_after": math.nan}, "stop_after: found nan"), ({"stop_after": "3"}, "found '3'"),
     ({"degree": 2**32 + 1}, "degree: found 4294967297, .* at most 2147483647"),
     ({"direction": math.nan}, "direction: found nan, expected -1, 0 or 1"),
+    ({"direction": 2}, "guard level: direction: found 2, expected -1, 0 or 1"),
+    ({"direction": "rising"}, "guard level: direction: found 'rising', expected -1, 0 or 1"),
     ({"in_modes": [0]}, "guard level: found in_modes, expected none in a system without modes")])
 def test_arguments_of_guards_that_are_none(arguments, words):
     guard = ricochet.Guard(lambda t, x: x[0] - 0.5, name="level", **arguments)
@@ -816,3 +818,84 @@ def test_one_system_in_many_threads():
         thread.join()
     for times in found:
         assert np.array_equal(times, expected)
+
+
+@pytest.mark.parametrize("members, words", [
+    ({"guards": ricochet.Guard(decay)}, r"guards: found a Guard, expected a sequence: guards=\["),
+    ({"guards": decay}, r"guards: found a function, expected a sequence"),
+    ({"guard": [ricochet.Guard(decay)]}, r"guard: found a list, expected a function, or guards="),
+    ({"modes": 2}, r"found flow\(t, y\) in a system with modes, expected flow\(mode, t, x\)"),
+    ({"flow": lambda mode, t, x: -x},
+     r"found flow\(mode, t, x\) in a system without modes, expected flow\(t, x\)")])
+def test_members_of_another_form(members, words):
+    with pytest.raises(TypeError, match=words):
+        ricochet.integrate(ricochet.System(**{"flow": decay, **members}), [1.0], 1.0)
+    for flow in decay, lambda t, x, k=1: -x, lambda *given: -given[-1], np.vectorize(decay):
+        assert ricochet.integrate(ricochet.System(flow), [1.0], 1.0).success
+
+
+@pytest.mark.parametrize("options, error, words", [
+    ({"max_step": 3}, TypeError, "found an option 'max_step'.*; did you mean 'max_steps'.$"),
+    ({"colour": 3}, TypeError, "found an option 'colour', expected some of atol, check_inside"),
+    ({"max_steps": -1}, TypeError, "max_steps: found -1, expected a whole number, not negative$"),
+    ({"stop_at_event": "yes"}, TypeError, "stop_at_event: found 'yes', expected True or False$"),
+    ({"rtol": "x"}, TypeError, "rtol: found 'x', expected a number$"),
+    ({"method": 3}, TypeError, "method: found 3, expected a text$"),
+    ({"sample_times": [[1.0, 2.0]]}, ValueError, "sample_times: found 2 dimensions, expected 1"),
+    ({"method": "rk4"}, ValueError, "method: found 'rk4', which has no error estimate, expected "
+                                    "fixed=True and a step beside it, or 'dopri5'"),
+    ({"method": "euler"}, ValueError, "method: found 'euler', which")])
+def test_options_of_integrate_that_are_none(options, error, words):
+    for system in ricochet.System(decay), ricochet.BouncingBall():
+        x0 = [1.0] if isinstance(system, ricochet.System) else [1.0, 0.0]
+        for run in ricochet.integrate, ricochet.Simulation:
+            with pytest.raises(error, match=words):
+                run(system, x0, 1.0, **options)
+
+
+def test_misspelt_options_of_solve_ivp_and_a_monitor_and_members():
+    with pytest.raises(TypeError, match="option 'dense_ouput'.*; did you mean 'dense_output'.$"):
+        ricochet.solve_ivp(decay, (0, 1), [1.0], dense_ouput=True)
+    with pytest.raises(TypeError, match="found an option 'locater'.*; did you mean 'locator'.$"):
+        ricochet.Monitor(ricochet.BouncingBall(), [1.0, 0.0], locater="newton")
+    with pytest.raises(TypeError, match="found a member 'gaurds'.*; did you mean 'guards'.$"):
+        ricochet.System(decay, gaurds=[])
+
+
+def test_a_rest_needs_a_reset():
+    rest = {"rest": lambda t, x: x}
+    with pytest.raises(ValueError, match="guard low: found a rest without a reset, expected both"):
+        ricochet.integrate(ricochet.System(decay, [ricochet.Guard(decay, name="low", **rest)]),
+                           [1.0], 1.0)
+    with pytest.raises(ValueError, match=r"events\[0\] \(event\): found a rest without a reset"):
+        ricochet.solve_ivp(decay, (0, 1), [1.0], events=marked(**rest))
+    system = ricochet.System(decay, [ricochet.Guard(lambda t, x: x[0] - 0.5, **rest)],
+                             reset_set=lambda t, x, fired: x + 1)
+    assert len(ricochet.integrate(system, [1.0], 1.0).events) == 1
+
+
+def test_messages_name_a_guard_without_a_name_by_its_number_and_list_the_modes():
+    guard = ricochet.Guard(lambda t, x: x[0] - 0.5, reset=lambda t, x: None)
+    with pytest.raises(TypeError, match="^reset of guard 0 returned None"):
+        ricochet.integrate(ricochet.System(decay, [guard]), [1.0], 1.0)
+    guard = ricochet.Guard(lambda mode, t, x: x[0], name="low", in_modes=["onn"])
+    with pytest.raises(ValueError, match=r"guard low: found the mode 'onn', which the system does "
+                                         r"not have, expected some of \['off', 'on'\]"):
+        ricochet.integrate(ricochet.System(lambda mode, t, x: -x, [guard], modes=["off", "on"]),
+                           [1.0], 1.0)
+
+
+def test_resets_that_contradict_each_other():
+    def run(**members):
+        return ricochet.integrate(ricochet.System(lambda t, x: [-1.0], **members), [1.0], 2.0)
+
+    low = [ricochet.Guard(lambda t, x: x[0], name=name, reset=lambda t, x, to=to: [to])
+           for name, to in (("low", 1.0), ("lower", 2.0))]
+    both = run(guards=low)
+    assert (both.outcome, both.guard, both.other_guard) == ("conflicting_resets", 0, 1)
+    assert both.message.endswith("declare reset_set(t, x, fired) to say what happens then: low, "
+                                 "lower")
+    timed = run(guards=low[:1], time_events=[1.0], time_reset=lambda t, x: [5.0])
+    assert (timed.outcome, timed.guard, timed.other_guard) == ("conflicting_resets", 0, -1)
+    assert timed.message.endswith(": low, a time event")
+    assert run(guards=low[:1]).other_guard is None

@@ -141,6 +141,11 @@ RunOptions read_options(const rc_options* given)
             "callbacks; expected RC_FEHLBERG78, or the system in C++ with ricochet/taylor.hpp");
     }
     run.fixed_step = reader.flag("fixed_step", from.fixed_step);
+    if (!run.fixed_step && (run.method == RC_RK4 || run.method == RC_EULER)) {
+        reader.refuse(
+            "method: found RC_RK4 or RC_EULER, which have no error estimate; expected fixed_step = "
+            "1 and a step, or RC_DOPRI5, RC_FEHLBERG78 or RC_CASH_KARP54");
+    }
     run.finders = reader.finders(from);
     if (from.sample_count > 0 && !from.sample_times) {
         reader.refuse("found a sample_count of " + std::to_string(from.sample_count) +

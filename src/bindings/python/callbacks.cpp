@@ -150,7 +150,8 @@ void CallbackSource::read_guard(PyObject* specification)
     guard.title = guard.owner = text_in(specification, "title");
     if (guard.title.empty()) {
         guard.title = "guard " + guard.name;
-        guard.owner = guard.name;
+        // One without a name is called by its number.
+        guard.owner = guard.name == std::to_string(guards_.size() - 1) ? guard.title : guard.name;
     }
     guard.value = Function(item(specification, "value").get(), guard.title);
     guard.rate = function("rate");
@@ -195,9 +196,11 @@ void CallbackSource::read_guard(PyObject* specification)
         if (!number) {
             PyErr_Clear();
             const Ref text = checked(PyObject_Repr(PyList_GET_ITEM(modes.get(), i)));
+            const Ref known = checked(PyObject_Repr(mode_list_.get()));
             raise(PyExc_ValueError, guard.title + ": found the mode " +
                                         PyUnicode_AsUTF8(text.get()) +
-                                        ", which the system does not have");
+                                        ", which the system does not have, expected some of " +
+                                        PyUnicode_AsUTF8(known.get()));
         }
         guard.in_mode[PyLong_AsSize_t(number)] = true;
     }

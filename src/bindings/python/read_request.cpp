@@ -45,11 +45,27 @@ namespace {
 
 using Setter = void (*)(Request&, const py::handle&);
 
+/// @throws py::type_error saying what was found and what was expected.
+template <class T>
+[[nodiscard]] T read_as(const py::handle& value)
+{
+    try {
+        return py::cast<T>(value);
+    } catch (const py::cast_error&) {
+        throw py::type_error("found " + py::cast<std::string>(py::repr(value)) + ", expected " +
+                             (std::is_same_v<T, bool>          ? "True or False"
+                              : std::is_same_v<T, std::string> ? "a text"
+                              : std::is_same_v<T, double>      ? "a number"
+                              : std::is_integral_v<T>          ? "a whole number, not negative"
+                                                               : "a sequence of numbers"));
+    }
+}
+
 template <auto member>
 void set(Request& request, const py::handle& value)
 {
     using T = std::remove_cvref_t<decltype(request.options.*member)>;
-    request.options.*member = py::cast<T>(value);
+    request.options.*member = read_as<T>(value);
 }
 
 [[nodiscard]] const std::map<std::string, Setter, std::less<>>& setters()
@@ -77,15 +93,15 @@ void set(Request& request, const py::handle& value)
         {"stall_steps", &set<&Options::stall_steps>},
         {"method",
          [](Request& request, const py::handle& value) {
-             const auto name = py::cast<std::string>(value);
+             const auto name = read_as<std::string>(value);
              request.by_series = name == "taylor";
              if (!request.by_series) request.method = method_named(name);
          }},
         {"fixed",
-         [](Request& request, const py::handle& value) { request.fixed = py::cast<bool>(value); }},
+         [](Request& request, const py::handle& value) { request.fixed = read_as<bool>(value); }},
         {"detector",
          [](Request& request, const py::handle& value) {
-             request.detector = one_of(py::cast<std::string>(value),
+             request.detector = one_of(read_as<std::string>(value),
                                        {"extremum", "ends", "bernstein", "planned", "calibrated",
                                         "calibrated-bounds", "foreseen", "certified", "network"});
          }},
@@ -96,15 +112,15 @@ void set(Request& request, const py::handle& value)
         {"locator",
          [](Request& request, const py::handle& value) {
              request.locator =
-                 one_of(py::cast<std::string>(value), {"newton", "bisection", "toms748"});
+                 one_of(read_as<std::string>(value), {"newton", "bisection", "toms748"});
          }},
         {"record_steps",
          [](Request& request, const py::handle& value) {
-             request.record_steps = py::cast<bool>(value);
+             request.record_steps = read_as<bool>(value);
          }},
         {"dense",
          [](Request& request, const py::handle& value) {
-             request.dense = request.options.record_steps = py::cast<bool>(value);
+             request.dense = request.options.record_steps = read_as<bool>(value);
          }},
     };
     return all;
@@ -135,8 +151,11 @@ Request request_from(const py::dict& given)
             for (const std::string& option : option_names()) {
                 known += (known.empty() ? "" : ", ") + option;
             }
-            throw py::type_error("found an option '" + std::string(name) + "', expected some of " +
-                                 known);
+            const py::list near =
+                py::module_::import("difflib").attr("get_close_matches")(name, option_names(), 1);
+            throw py::type_error(
+                "found an option '" + std::string(name) + "', expected some of " + known +
+                (near.empty() ? "" : "; did you mean '" + py::cast<std::string>(near[0]) + "'?"));
         }
         if (PyComplex_Check(value.ptr())) {  // NumPy's, too, whose imaginary part would be lost
             throw py::type_error(std::string(name) + ": found " +
@@ -146,12 +165,20 @@ Request request_from(const py::dict& given)
         try {
             setter->second(request, value);
         } catch (const py::cast_error&) {
-            throw py::type_error(
-                std::string(name) + ": found " + py::cast<std::string>(py::repr(value)) + ", a " +
-                py::cast<std::string>(py::str(py::type::of(value).attr("__name__"))));
+            throw py::type_error(std::string(name) + ": found " +
+                                 py::cast<std::string>(py::repr(value)) + ", expected a Network");
+        } catch (const py::type_error& error) {
+            throw py::type_error(std::string(name) + ": " + error.what());
         } catch (const py::value_error& error) {
             throw py::value_error(std::string(name) + ": " + error.what());
         }
+    }
+    if (!request.fixed && !request.by_series &&
+        (request.method == MethodName::rk4 || request.method == MethodName::euler)) {
+        throw py::value_error(std::string("method: found '") +
+                              (request.method == MethodName::rk4 ? "rk4" : "euler") +
+                              "', which has no error estimate, expected fixed=True and a step "
+                              "beside it, or 'dopri5', 'fehlberg78' or 'cash-karp54'");
     }
     return request;
 }
