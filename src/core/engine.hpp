@@ -117,7 +117,8 @@ protected:
 
     void add_evidence(Evidence evidence, std::uint64_t steps) noexcept;
 
-    /// Brings the statistics up to date with what the step, the search and the planner have counted.
+    /// Brings the statistics up to date with what the step, the search and the planner have
+    /// counted.
     void collect_counts() noexcept
     {
         run_.statistics.flow_calls = step_.flow_calls();
