@@ -243,13 +243,13 @@ public:
     /// changed the state. May return a cut immediately, for a guard that is about to be crossed.
     /// @param dxdt   the rate at x in offsets, n doubles
     /// @param scale  [s] approximate length of the next step
-    /// @throws std::invalid_argument for a time, state, rate, scale or guard that is not finite, an
+    /// @throws std::invalid_argument for a time, state, scale or guard that is not finite, an
     /// array of the wrong size, an unknown mode, or a state behind a surface that bounds the
     /// motion.
     Verdict start(const Instant& t, std::span<const double> x, std::span<const double> dxdt,
                   double scale, Mode mode = 0)
     {
-        return monitor_->start(t, taken(x), finite("dxdt", dxdt, x.size()), mode, scale);
+        return monitor_->start(t, taken(x), checked(dxdt, x.size()), mode, scale);
     }
     /// The same, with the rate of the system's flow.
     Verdict start(const Instant& t, std::span<const double> x, double scale, Mode mode = 0)
@@ -258,8 +258,9 @@ public:
     }
 
     /// Looks for events in the next step.
-    /// @throws std::invalid_argument for a length that is not above zero, and for a number of x1 or
-    /// a rate that is not finite; nothing has changed then
+    /// Rates need not be finite: then guards are evaluated in their place.
+    /// @throws std::invalid_argument for a length that is not above zero, and for a number of x1
+    /// that is not finite; nothing has changed then
     /// @throws std::domain_error where an event is located on states of the host's `restep` or
     /// `interpolate` that are not finite
     /// @throws std::logic_error for a step out of turn: one that does not start where the last one
@@ -274,8 +275,8 @@ public:
                                     .h = step.h(),
                                     .x0 = checked(step.x0(), n),
                                     .x1 = finite("x1", step.x1(), n),
-                                    .rate0 = finite("rate0", step.rate0(), n),
-                                    .rate1 = finite("rate1", step.rate1(), n),
+                                    .rate0 = checked(step.rate0(), n),
+                                    .rate1 = checked(step.rate1(), n),
                                     .host = &step,
                                     .interpolate = &interpolate<S>,
                                     .t_remainder = start.remainder,
@@ -290,7 +291,7 @@ public:
     /// their surfaces, or for a motion that comes to rest.
     [[nodiscard]] Verdict resume(std::span<const double> dxdt, double scale)
     {
-        return monitor_->resume(finite("dxdt", dxdt, monitor_->x().size()), scale);
+        return monitor_->resume(checked(dxdt, monitor_->x().size()), scale);
     }
     /// The same, with the rate of the system's flow.
     [[nodiscard]] Verdict resume(double scale) { return monitor_->resume(nullptr, scale); }
@@ -298,7 +299,7 @@ public:
     [[nodiscard]] Verdict resume(std::span<const double> after, Mode mode,
                                  std::span<const double> dxdt, double scale)
     {
-        return monitor_->resume(taken(after), mode, finite("dxdt", dxdt, after.size()), scale);
+        return monitor_->resume(taken(after), mode, checked(dxdt, after.size()), scale);
     }
 
     /// Tells the monitor that the state has been kept until t [s], at most `must_stop_at`. Returns
@@ -325,7 +326,7 @@ public:
     /// @throws std::logic_error if t lies beyond that
     void skip_to(const Instant& t, std::span<const double> x, std::span<const double> dxdt)
     {
-        monitor_->skip_to(t, taken(x), finite("dxdt", dxdt, x.size()));
+        monitor_->skip_to(t, taken(x), checked(dxdt, x.size()));
     }
 
     /// The side of its surface that a guard is on.

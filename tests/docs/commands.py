@@ -18,7 +18,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 LONG = [r"simulate fault .*elements=(25|50)", r"compare (step-control|fault|rate-and-state)", r"\btrain\b", r"rate_and_state=1",
         r"^ricochet-studies", r"kick="]
-OTHERS = [r"scripts/\w+", r"bench/report/compare\.py ", r"cmake ", r"ctest ", r"pip install", r"git ", r"cc mine\.c", r"build/release/bin/ricochet_\w+", r"doxygen", r"mpirun "]
+OTHERS = [r"scripts/\w+", r"bench/report/compare\.py ", r"cmake ", r"ctest ", r"pip install", r"git ", r"cc mine\.c", r"g\+\+ ", r"build/release/bin/ricochet_\w+", r"doxygen", r"mpirun "]
 
 
 def commands():
