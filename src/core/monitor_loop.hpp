@@ -175,7 +175,11 @@ public:
         if (guard >= bank_.size()) throw_no_such_guard(guard, bank_.size());
         return bank_[guard].side;
     }
-    [[nodiscard]] const Run<X>& run() const noexcept override { return run_; }
+    [[nodiscard]] const Run<X>& run() noexcept override
+    {
+        this->collect_counts();
+        return run_;
+    }
     void clear_events() noexcept override { run_.events.clear(); }
 
     [[nodiscard]] Snapshot save() override
@@ -298,11 +302,8 @@ private:
     Verdict or_start_anew(const Function& function)
     {
         try {
-            const Verdict verdict = function();
-            this->collect_counts();
-            return verdict;
+            return function();
         } catch (...) {
-            this->collect_counts();
             started_ = resting_ = false;
             this->pending_ = Pending::nothing;
             step_.restart(step_.start(), step_.x0(), step_.mode());

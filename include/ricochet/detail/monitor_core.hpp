@@ -71,7 +71,7 @@ public:
     virtual void skip_to(const Instant& t, const X& x, const double* dxdt) = 0;
     [[nodiscard]] virtual Side side(std::size_t guard) const = 0;
     /// Records so far; their time and state are those of the last `start`.
-    [[nodiscard]] virtual const Run<X>& run() const noexcept = 0;
+    [[nodiscard]] virtual const Run<X>& run() noexcept = 0;
     virtual void clear_events() noexcept = 0;
     [[nodiscard]] virtual Snapshot save() = 0;
     virtual void restore(const Snapshot& snapshot) = 0;
