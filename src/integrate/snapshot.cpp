@@ -206,10 +206,12 @@ void require_same_run(const std::vector<RunProperty>& saved, const std::vector<R
 {
     if (saved.empty()) refuse_snapshot("it does not say of which run it is");
     for (std::size_t i = 0; i < std::min(saved.size(), here.size()); ++i) {
+        if (saved[i] == here[i]) continue;
         // A text has every property on one line.
         if (saved[i].name == here[i].name &&
-            on_one_line(saved[i].value) == on_one_line(here[i].value))
+            on_one_line(saved[i].value) == on_one_line(here[i].value)) {
             continue;
+        }
         // the name of `check_inside` before version 0.2
         if (saved[i].name == "look_inside" && here[i].name == "check_inside" &&
             saved[i].value == here[i].value)
