@@ -100,34 +100,6 @@ template <class F>
     }
 }
 
-/// Functions g with g' = f(a) a' for another series f.
-[[nodiscard]] bool is_function(TaylorOp op) noexcept
-{
-    switch (op) {
-        case TaylorOp::exponential:
-        case TaylorOp::sine:
-        case TaylorOp::cosine:
-        case TaylorOp::hyperbolic_sine:
-        case TaylorOp::hyperbolic_cosine:
-        case TaylorOp::tangent:
-        case TaylorOp::hyperbolic_tangent: return true;
-        default: return false;
-    }
-}
-
-/// Functions g with f(a) g' = a'.
-[[nodiscard]] bool is_inverse(TaylorOp op) noexcept
-{
-    switch (op) {
-        case TaylorOp::logarithm:
-        case TaylorOp::arc_sine:
-        case TaylorOp::arc_cosine:
-        case TaylorOp::arc_tangent:
-        case TaylorOp::angle: return true;
-        default: return false;
-    }
-}
-
 }  // namespace
 
 // --- arrangement ---

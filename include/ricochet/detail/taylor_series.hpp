@@ -59,27 +59,11 @@ class TaylorSeries {
     static constexpr auto slopes_wanted = [] {
         std::array<bool, Tape::ops_count> wanted{};
         for (std::size_t i = Tape::states + 1; i < Tape::ops_count; ++i) {
-            switch (tape.ops[i].op) {
-                case TaylorOp::exponential:
-                case TaylorOp::sine:
-                case TaylorOp::cosine:
-                case TaylorOp::hyperbolic_sine:
-                case TaylorOp::hyperbolic_cosine:
-                case TaylorOp::tangent:
-                case TaylorOp::hyperbolic_tangent:
-                    wanted[static_cast<std::size_t>(tape.ops[i].a)] = true;
-                    break;
-                case TaylorOp::logarithm:
-                case TaylorOp::arc_sine:
-                case TaylorOp::arc_cosine:
-                case TaylorOp::arc_tangent: wanted[i] = true; break;
-                case TaylorOp::angle:
-                    wanted[i] = true;
-                    wanted[static_cast<std::size_t>(tape.ops[i].a)] = true;
-                    wanted[static_cast<std::size_t>(tape.ops[i].b)] = true;
-                    break;
-                default: break;
-            }
+            const TapeOp& op = tape.ops[i];
+            const bool is_angle = op.op == TaylorOp::angle;
+            if (is_function(op.op) || is_angle) wanted[static_cast<std::size_t>(op.a)] = true;
+            if (is_angle) wanted[static_cast<std::size_t>(op.b)] = true;
+            if (is_inverse(op.op)) wanted[i] = true;
         }
         return wanted;
     }();

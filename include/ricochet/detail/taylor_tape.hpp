@@ -31,6 +31,34 @@ struct TapeOp {
     double exponent = 0;
 };
 
+/// Functions g with g' = f(a) a' for another series f.
+[[nodiscard]] constexpr bool is_function(TaylorOp op) noexcept
+{
+    switch (op) {
+        case TaylorOp::exponential:
+        case TaylorOp::sine:
+        case TaylorOp::cosine:
+        case TaylorOp::hyperbolic_sine:
+        case TaylorOp::hyperbolic_cosine:
+        case TaylorOp::tangent:
+        case TaylorOp::hyperbolic_tangent: return true;
+        default: return false;
+    }
+}
+
+/// Functions g with f(a) g' = a'.
+[[nodiscard]] constexpr bool is_inverse(TaylorOp op) noexcept
+{
+    switch (op) {
+        case TaylorOp::logarithm:
+        case TaylorOp::arc_sine:
+        case TaylorOp::arc_cosine:
+        case TaylorOp::arc_tangent:
+        case TaylorOp::angle: return true;
+        default: return false;
+    }
+}
+
 /// Degree of a series that is no polynomial in time.
 inline constexpr int no_degree = 1 << 20;
 

@@ -147,15 +147,9 @@ Request request_from(const py::dict& given)
         const auto name = py::cast<std::string_view>(key);
         const auto setter = setters().find(name);
         if (setter == setters().end()) {
-            std::string known;
-            for (const std::string& option : option_names()) {
-                known += (known.empty() ? "" : ", ") + option;
-            }
-            const py::list near =
-                py::module_::import("difflib").attr("get_close_matches")(name, option_names(), 1);
-            throw py::type_error(
-                "found an option '" + std::string(name) + "', expected some of " + known +
-                (near.empty() ? "" : "; did you mean '" + py::cast<std::string>(near[0]) + "'?"));
+            const py::object meant = py::module_::import("ricochet._numbers").attr("meant_by");
+            throw py::type_error("found an option '" + std::string(name) + "', expected some of " +
+                                 py::cast<std::string>(meant(name, option_names())));
         }
         if (PyComplex_Check(value.ptr())) {  // NumPy's, too, whose imaginary part would be lost
             throw py::type_error(std::string(name) + ": found " +
