@@ -4,7 +4,7 @@
 #include "problems/cavern.hpp"
 #include "problems/opaque.hpp"
 #include "problems/planar_arm.hpp"
-#include "ricochet/learn/train_gate.hpp"
+#include "ricochet/learn/train.hpp"
 
 namespace ricochet::bench {
 

@@ -17,7 +17,7 @@
 #include "report/problems.hpp"
 #include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/nn/model.hpp"

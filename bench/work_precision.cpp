@@ -7,7 +7,7 @@
 
 #include "odeint_by_hand.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/nn/model.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/learn/train_gate.hpp"
+#include "ricochet/learn/train.hpp"
 
 struct Drone {
     // x = (position [m], velocity [m/s]), two components each

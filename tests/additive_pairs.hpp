@@ -1,8 +1,7 @@
 // Additive pairs for tests.
 #pragma once
 
-#include "ricochet/faults/laws.hpp"
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet::test {
 

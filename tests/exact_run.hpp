@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "random_systems.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet::test {
 

@@ -20,8 +20,7 @@
 #include <vector>
 
 #include "ricochet/detail/stiffness_series.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
-#include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/friction.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::test {

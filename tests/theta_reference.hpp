@@ -5,7 +5,7 @@
 #include <cmath>
 #include <vector>
 
-#include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet::test {
 

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "cells.hpp"
-#include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/friction.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 #ifdef RICOCHET_REPORT_CVODE
 #include <sunlinsol/sunlinsol_dense.h>

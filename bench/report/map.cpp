@@ -33,7 +33,7 @@
 #include "problems/cavern.hpp"
 #include "problems/opaque.hpp"
 #include "ricochet/detect/gates.hpp"
-#include "ricochet/learn/train_gate.hpp"
+#include "ricochet/learn/train.hpp"
 
 namespace ricochet::bench {
 

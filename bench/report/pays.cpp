@@ -15,7 +15,6 @@
 #include "ricochet/detect/planned.hpp"
 #elif defined(RICOCHET_PAYS_network)
 #include "ricochet/detect/gates.hpp"
-#include "ricochet/detect/network.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #elif defined(RICOCHET_PAYS_friction)

@@ -265,7 +265,7 @@ def train_classifier(system, starts, *, step, mode=None, method="rk4", progress=
     run_length, surface_points, states, fresh_states, trial_events, most_steps, margin, widened,
     hidden, iterations, batch, rate, final_rate, evaluate_every, logit_margin, checkpoint,
     checkpoint_every, resume
-        As in C++ (``learn/train_classifier.hpp``, ``learn/classifier.hpp``).
+        As in C++ (``learn/train.hpp``, ``learn/classifier.hpp``).
 
     Returns
     -------
@@ -319,7 +319,7 @@ def train_gate(system, starts, levels=None, *, step=None, mode=None, method=None
     run_length, events, states, validation_events, fresh_events, most_steps, hidden, iterations,
     rounds, hard_events, neighbours, batch, rate, final_rate, evaluate_every, patience,
     fatal_weight, quantile, logit_margin, checkpoint, resume
-        As in C++ (``learn/gate.hpp``).
+        As in C++ (``learn/classifier.hpp``).
 
     Returns
     -------

@@ -21,12 +21,10 @@
 #include "policy_advice.hpp"
 #include "registry.hpp"
 #include "report.hpp"
-#include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/gate_features.hpp"
-#include "ricochet/nn/certificate.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
-#include "ricochet/nonsmooth/step_policy.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 #include "timing.hpp"
 
 namespace ricochet::app {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-#include "ricochet/nonsmooth/step_policy.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet::app {
 

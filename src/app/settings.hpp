@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/options.hpp"
 
 namespace ricochet {

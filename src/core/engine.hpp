@@ -32,7 +32,6 @@
 #include "ricochet/detail/refusals.hpp"
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/run.hpp"
-#include "ricochet/integrate/snapshot.hpp"
 
 namespace ricochet::detail {
 

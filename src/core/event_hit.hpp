@@ -9,7 +9,7 @@
 
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detect/step_probe.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/integrate/options.hpp"
 
 namespace ricochet::detail {

@@ -23,7 +23,7 @@
 #include "ricochet/detail/series_guard.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/step_probe.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/locate/locators.hpp"
 

@@ -17,7 +17,7 @@
 #include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet::detail {
 

@@ -14,7 +14,7 @@
 #include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/shrinking_intervals.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet::detail {
 

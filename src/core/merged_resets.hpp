@@ -13,7 +13,7 @@
 #include "core/guard_bank.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet::detail {
 

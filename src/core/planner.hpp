@@ -23,7 +23,6 @@
 #include "core/metering.hpp"
 #include "core/tentative_steps.hpp"
 #include "ricochet/detect/planned.hpp"
-#include "ricochet/hybrid/statistics.hpp"
 #include "ricochet/integrate/run.hpp"
 
 namespace ricochet::detail {

@@ -19,7 +19,7 @@
 #include "ricochet/detail/series_guard.hpp"
 #include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet::detail {
 

@@ -1,4 +1,4 @@
-#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/gates.hpp"
 
 #include <fmt/format.h>
 

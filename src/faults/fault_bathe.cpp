@@ -1,4 +1,4 @@
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 #include <fmt/format.h>
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "fault_forces.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::detail {
 

@@ -7,7 +7,7 @@
 
 #include "../files/read_file.hpp"
 #include "../files/strict_json.hpp"
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet {
 

@@ -1,4 +1,4 @@
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 
 namespace ricochet {
 

@@ -1,4 +1,4 @@
-#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/run.hpp"
 
 namespace ricochet {
 

@@ -1,4 +1,4 @@
-#include "ricochet/integrate/snapshot.hpp"
+#include "ricochet/integrate/run.hpp"
 
 #include <fmt/format.h>
 

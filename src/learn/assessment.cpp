@@ -8,7 +8,7 @@
 
 #include <boost/math/special_functions/beta.hpp>
 
-#include "ricochet/detail/classifier.hpp"
+#include "ricochet/nn/mlp.hpp"
 
 namespace ricochet::learn {
 

@@ -1,4 +1,4 @@
-#include "ricochet/learn/bouncing_ball.hpp"
+#include "ricochet/learn/classifier.hpp"
 
 #include <cmath>
 #include <stdexcept>

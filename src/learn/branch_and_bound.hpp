@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "ricochet/detail/bounds.hpp"
-#include "ricochet/detail/classifier.hpp"
 #include "ricochet/learn/certify.hpp"
+#include "ricochet/nn/mlp.hpp"
 
 namespace ricochet::learn {
 

@@ -1,4 +1,4 @@
-#include "ricochet/learn/evolution.hpp"
+#include "ricochet/learn/policies.hpp"
 
 #include <fmt/format.h>
 

@@ -11,8 +11,7 @@
 
 #include "../faults/fast_tanh.hpp"
 #include "ricochet/detail/random.hpp"
-#include "ricochet/faults/laws.hpp"
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet::learn::detail {
 

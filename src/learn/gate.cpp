@@ -1,4 +1,4 @@
-#include "ricochet/learn/gate.hpp"
+#include "ricochet/learn/classifier.hpp"
 
 #include <fmt/format.h>
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "ricochet/detail/random.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "step_reference.hpp"
 

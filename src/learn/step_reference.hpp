@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"

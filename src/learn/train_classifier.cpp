@@ -1,4 +1,4 @@
-#include "ricochet/learn/train_classifier.hpp"
+#include "ricochet/learn/train.hpp"
 
 #include <fmt/format.h>
 

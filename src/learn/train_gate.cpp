@@ -1,5 +1,5 @@
-#include "ricochet/learn/train_gate.hpp"
-#include "ricochet/learn/gate.hpp"
+#include "ricochet/learn/classifier.hpp"
+#include "ricochet/learn/train.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/nn/certificate.hpp"
+#include "ricochet/nn/mlp.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/detail/classifier.hpp"
+#include "ricochet/nn/mlp.hpp"
 
 #include <array>
 #include <stdexcept>

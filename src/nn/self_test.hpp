@@ -1,7 +1,7 @@
 // The test evaluation in a model file, which is repeated when the file is read.
 #pragma once
 
-#include "ricochet/detail/classifier.hpp"
+#include "ricochet/nn/mlp.hpp"
 #include "safetensors_header.hpp"
 
 namespace ricochet::model_file {

@@ -1,4 +1,4 @@
-#include "ricochet/nonsmooth/convex_sets.hpp"
+#include "ricochet/nonsmooth/inclusion.hpp"
 
 #include <fmt/format.h>
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "../checks/require.hpp"
-#include "ricochet/nonsmooth/step_policy.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {
 

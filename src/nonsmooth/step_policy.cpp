@@ -1,4 +1,4 @@
-#include "ricochet/nonsmooth/step_policy.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 #include <fmt/format.h>
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 

@@ -7,7 +7,6 @@
 #include <string_view>
 
 #include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 

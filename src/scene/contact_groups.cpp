@@ -3,7 +3,7 @@
 
 #include <utility>
 
-#include "ricochet/scene/contact.hpp"
+#include "ricochet/scene/simulate.hpp"
 #include "scene/contact_island.hpp"
 #include "scene/lasting.hpp"
 

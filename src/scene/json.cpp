@@ -1,4 +1,4 @@
-#include "ricochet/scene/json.hpp"
+#include "ricochet/scene/simulate.hpp"
 
 #include <fmt/format.h>
 

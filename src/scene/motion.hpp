@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "ricochet/scene/motion.hpp"
+#include "ricochet/scene/scene.hpp"
 #include "scene/vector2.hpp"
 
 namespace ricochet::detail {

@@ -17,7 +17,7 @@
 #include "json_text.hpp"
 #include "registry.hpp"
 #include "report.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "run_watch.hpp"
 #include "studies.hpp"
 #include "timing.hpp"

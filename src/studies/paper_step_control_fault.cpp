@@ -18,7 +18,7 @@
 #include "learn/step_environment.hpp"
 #include "paper_step_control.hpp"
 #include "policy_lookup.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "studies.hpp"
 
 namespace ricochet::app {

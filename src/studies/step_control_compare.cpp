@@ -23,7 +23,7 @@
 #include "policy_lookup.hpp"
 #include "registry.hpp"
 #include "report.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 #include "run_watch.hpp"

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "ricochet/detail/gate_specs.hpp"
-#include "ricochet/faults/laws.hpp"
-#include "ricochet/learn/bouncing_ball.hpp"
+#include "ricochet/faults/friction.hpp"
+#include "ricochet/learn/classifier.hpp"
 
 namespace ricochet::studies {
 

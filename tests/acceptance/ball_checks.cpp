@@ -12,7 +12,7 @@
 #include "measure.hpp"
 #include "problems.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/nn/model.hpp"

@@ -11,9 +11,9 @@
 
 #include "measure.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/snapshot.hpp"
+#include "ricochet/integrate/run.hpp"
 #include "ricochet/locate/locators.hpp"
 #include "saved_systems.hpp"
 

@@ -9,7 +9,7 @@
 #include "measure.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "ricochet/detect/gates.hpp"
-#include "ricochet/nn/certificate.hpp"
+#include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 #include "scene_rows.hpp"
 

@@ -9,7 +9,7 @@
 #include <fstream>
 #include <string>
 
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::bench {
 

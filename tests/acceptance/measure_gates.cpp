@@ -16,7 +16,7 @@
 #include "problems/least_eigenvalue.hpp"
 #include "problems/opaque.hpp"
 #include "problems/planar_arm.hpp"
-#include "ricochet/learn/train_gate.hpp"
+#include "ricochet/learn/train.hpp"
 
 namespace ricochet::bench {
 

@@ -14,7 +14,6 @@
 
 #include "measure.hpp"
 #include "ricochet/integrate/integrate.hpp"
-#include "ricochet/scene/contact.hpp"
 #include "ricochet/scene/simulate.hpp"
 #include "scene/brute_force.hpp"
 #include "scene/gas.hpp"

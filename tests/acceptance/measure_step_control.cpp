@@ -13,7 +13,7 @@
 #include <string>
 #include <thread>
 
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/systems/diode_circuit.hpp"

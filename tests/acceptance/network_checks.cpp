@@ -16,10 +16,10 @@
 #include "measure.hpp"
 #include "problems.hpp"
 #include "ricochet/detail/assessment.hpp"
-#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/integrate/methods.hpp"
-#include "ricochet/learn/bouncing_ball.hpp"
+#include "ricochet/learn/classifier.hpp"
 #include "ricochet/nn/model.hpp"
 #include "score.hpp"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "app.hpp"
-#include "ricochet/nn/certificate.hpp"
+#include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::certify_test {

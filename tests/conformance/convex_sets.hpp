@@ -15,7 +15,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/nonsmooth/convex_sets.hpp"
+#include "ricochet/nonsmooth/inclusion.hpp"
 
 namespace ricochet::test {
 

@@ -13,7 +13,7 @@
 #include <string>
 #include <utility>
 
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet::test {
 

@@ -4,7 +4,6 @@
 #include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/gates.hpp"
-#include "ricochet/detect/network.hpp"
 
 namespace ricochet::test::detectors_conformance_test {
 namespace {

@@ -4,7 +4,6 @@
 
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/gates.hpp"
-#include "ricochet/detect/network.hpp"
 #include "ricochet/learn/certify.hpp"
 
 namespace ricochet::test::gates_conformance_test {

@@ -12,7 +12,6 @@
 #include "refusal.hpp"
 #include "ricochet/detail/fault_kernel.hpp"
 #include "ricochet/detail/stiffness_series.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::fault_test {

@@ -6,7 +6,7 @@
 #include "additive_pairs.hpp"
 #include "rate_state_identities.hpp"
 #include "ricochet/detail/affine_law.hpp"
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet::test::potentials_conformance_test {
 namespace {

@@ -9,8 +9,7 @@
 #include <vector>
 
 #include "ricochet/detail/identify_friction.hpp"
-#include "ricochet/faults/laws.hpp"
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 #include "theta_reference.hpp"
 
 namespace ricochet::rate_state_histories_test {

@@ -6,7 +6,6 @@
 #include <cstddef>
 
 #include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet::hosts_test {
 

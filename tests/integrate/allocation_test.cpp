@@ -12,7 +12,7 @@
 #include "problems/planar_arm.hpp"
 #include "problems/zones.hpp"
 #include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/locators.hpp"

@@ -3,7 +3,7 @@
 
 #include <memory>
 
-#include "ricochet/nonsmooth/step_policy.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet::test::controllers_conformance_test {
 namespace {

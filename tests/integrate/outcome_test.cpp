@@ -1,6 +1,6 @@
 // Runs that cannot continue: states of a wrong dimension, time that stands still.
 
-#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/run.hpp"
 
 #include <gtest/gtest.h>
 

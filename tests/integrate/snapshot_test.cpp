@@ -1,6 +1,6 @@
 // A snapshot identifies its run, and is read only where it is valid.
 
-#include "ricochet/integrate/snapshot.hpp"
+#include "ricochet/integrate/run.hpp"
 
 #include <gtest/gtest.h>
 

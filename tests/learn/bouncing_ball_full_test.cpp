@@ -1,7 +1,7 @@
 // The complete trainings of the stored models: less than a minute on one core.
 #include <gtest/gtest.h>
 
-#include "ricochet/learn/bouncing_ball.hpp"
+#include "ricochet/learn/classifier.hpp"
 
 namespace ricochet::learn::bouncing_ball_full_test {
 namespace {

@@ -1,4 +1,4 @@
-#include "ricochet/learn/bouncing_ball.hpp"
+#include "ricochet/learn/classifier.hpp"
 
 #include <array>
 #include <cmath>
@@ -8,9 +8,9 @@
 
 #include <gtest/gtest.h>
 
-#include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/features.hpp"
 #include "ricochet/detail/random.hpp"
+#include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 

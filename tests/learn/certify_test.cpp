@@ -18,7 +18,7 @@
 #include "ricochet/detail/bounds.hpp"
 #include "ricochet/detail/gate.hpp"
 #include "ricochet/detail/random.hpp"
-#include "ricochet/nn/certificate.hpp"
+#include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::certify_test {

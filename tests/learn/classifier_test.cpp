@@ -15,8 +15,8 @@
 #include <nlohmann/json.hpp>
 
 #include "ricochet/detail/checkpoint.hpp"
-#include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/random.hpp"
+#include "ricochet/nn/mlp.hpp"
 
 namespace ricochet::learn::classifier_test {
 namespace {

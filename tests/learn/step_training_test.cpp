@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "ricochet/learn/step_control.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"

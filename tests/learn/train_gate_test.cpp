@@ -1,6 +1,6 @@
 // Gates trained for a user's system.
-#include "ricochet/learn/train_gate.hpp"
 #include "refusal.hpp"
+#include "ricochet/learn/train.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ricochet/detail/classifier.hpp"
+#include "ricochet/nn/mlp.hpp"
 
 namespace ricochet::learn::trainable_mlp_test {
 namespace {

@@ -4,7 +4,7 @@
 #include "ricochet/nn/model.hpp"
 
 #include "nn_models.hpp"
-#include "ricochet/detail/classifier.hpp"
+#include "ricochet/nn/mlp.hpp"
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "ricochet/nonsmooth/event_hand_over.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "ricochet/nonsmooth/convex_sets.hpp"
+#include "ricochet/nonsmooth/inclusion.hpp"
 
 namespace ricochet::sets_test {
 namespace {

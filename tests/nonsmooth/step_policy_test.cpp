@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "refusal.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
-#include "ricochet/nonsmooth/step_policy.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 

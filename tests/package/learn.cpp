@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <span>
 
-#include "ricochet/learn/evolution.hpp"
+#include "ricochet/learn/policies.hpp"
 
 int main()
 {

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "ricochet/nonsmooth/event_hand_over.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
 int main()

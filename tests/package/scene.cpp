@@ -2,7 +2,6 @@
 #include <cmath>
 #include <cstdio>
 
-#include "ricochet/scene/json.hpp"
 #include "ricochet/scene/simulate.hpp"
 
 int main()

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <vector>
 
-#include "ricochet/scene/contact.hpp"
+#include "ricochet/scene/simulate.hpp"
 
 namespace ricochet::carried_test {
 namespace {

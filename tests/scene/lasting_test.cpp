@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "gas.hpp"
-#include "ricochet/scene/contact.hpp"
+#include "ricochet/scene/simulate.hpp"
 
 namespace ricochet::lasting_test {
 namespace {

@@ -1,5 +1,5 @@
 // Surfaces that move by a given motion, against roots in long double and closed forms.
-#include "ricochet/scene/motion.hpp"
+#include "ricochet/scene/scene.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "refusal.hpp"
-#include "ricochet/scene/json.hpp"
 #include "ricochet/scene/simulate.hpp"
 
 namespace ricochet::motion_test {

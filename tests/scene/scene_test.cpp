@@ -10,7 +10,6 @@
 #include <string>
 
 #include "refusal.hpp"
-#include "ricochet/scene/json.hpp"
 #include "ricochet/scene/simulate.hpp"
 
 namespace ricochet::scene_test {

@@ -8,7 +8,6 @@
 #include <random>
 #include <vector>
 
-#include "ricochet/scene/contact.hpp"
 #include "ricochet/scene/simulate.hpp"
 
 namespace ricochet::terrain_test {

@@ -14,7 +14,7 @@
 
 #include <functional>
 
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet {
 

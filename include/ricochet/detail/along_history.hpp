@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "ricochet/detail/variational_step.hpp"
-#include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet {
 

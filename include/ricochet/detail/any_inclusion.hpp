@@ -18,9 +18,9 @@
 #include "ricochet/detail/inclusion_declarations.hpp"
 #include "ricochet/detail/linear_cases.hpp"
 #include "ricochet/detail/owned.hpp"
-#include "ricochet/detail/step_layout.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {
 

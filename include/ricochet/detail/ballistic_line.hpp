@@ -5,7 +5,7 @@
 #pragma once
 
 #include "ricochet/detail/features.hpp"
-#include "ricochet/detect/network.hpp"
+#include "ricochet/detect/gates.hpp"
 
 namespace ricochet {
 

@@ -14,7 +14,6 @@
 #include "ricochet/detail/system_table.hpp"
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/run.hpp"
-#include "ricochet/integrate/snapshot.hpp"
 
 namespace ricochet::detail {
 

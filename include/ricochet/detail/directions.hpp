@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "ricochet/detail/differences.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {

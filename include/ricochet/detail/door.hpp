@@ -15,7 +15,7 @@
 #include "ricochet/detail/system_table.hpp"
 #include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/system.hpp"
-#include "ricochet/integrate/snapshot.hpp"
+#include "ricochet/integrate/run.hpp"
 
 namespace ricochet::detail {
 

@@ -1,7 +1,7 @@
 // Internal: the declarations of this header may change without notice.
 //
 // Derivatives of flow and resets along a direction of state and time by dual numbers, for functions
-// that take any scalar (hybrid/scalar.hpp).
+// that take any scalar (hybrid/guard.hpp).
 #pragma once
 
 #include <array>

@@ -14,7 +14,7 @@
 #include "ricochet/detail/dual_derivatives.hpp"
 #include "ricochet/detail/scalar_probe.hpp"
 #include "ricochet/dual.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet::detail {

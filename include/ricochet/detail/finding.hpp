@@ -5,7 +5,7 @@
 
 #include "ricochet/detail/guard_view.hpp"
 #include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/statistics.hpp"
+#include "ricochet/integrate/run.hpp"
 
 namespace ricochet {
 

@@ -10,7 +10,6 @@
 #include <type_traits>
 
 #include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 

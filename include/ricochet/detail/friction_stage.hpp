@@ -20,7 +20,7 @@
 #include <limits>
 
 #include "ricochet/detail/wright_omega.hpp"
-#include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet {
 

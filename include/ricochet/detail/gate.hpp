@@ -15,9 +15,9 @@
 #include <optional>
 #include <string_view>
 
-#include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/gate_features.hpp"
 #include "ricochet/hybrid/system.hpp"
+#include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet {

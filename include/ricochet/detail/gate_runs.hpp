@@ -26,7 +26,7 @@
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/simulation.hpp"
-#include "ricochet/learn/gate.hpp"
+#include "ricochet/learn/classifier.hpp"
 
 namespace ricochet::learn {
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "ricochet/detail/data_set.hpp"
-#include "ricochet/learn/train_gate.hpp"
+#include "ricochet/learn/train.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 #include "ricochet/systems/pendulum.hpp"

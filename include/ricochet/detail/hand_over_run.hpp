@@ -9,9 +9,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/integrate/options.hpp"
-#include "ricochet/integrate/outcome.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 

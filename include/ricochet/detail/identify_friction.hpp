@@ -6,7 +6,7 @@
 #include <atomic>
 #include <vector>
 
-#include "ricochet/faults/laws.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet::learn {
 

@@ -163,7 +163,7 @@ constexpr void refuse_no_inclusion()
                       "State& f) const, of Eigen's vectors with state_size components");
         static_assert(!Name_smooth::takes<const System, double, W, StateOf<System>&> || Inclusion<System>,
                       "ricochet: found no `reaction_set` that fits; expected reaction_set(double t, const State& w) "
-                      "const, which returns a set of nonsmooth/convex_sets.hpp");
+                      "const, which returns a set of nonsmooth/inclusion.hpp");
     }
 }
 

@@ -15,7 +15,7 @@
 #include <cmath>
 #include <limits>
 
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet {
 

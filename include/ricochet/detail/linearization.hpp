@@ -1,7 +1,7 @@
 // Internal: the declarations of this header may change without notice.
 //
 // A system and its derivatives: the derivatives that it declares, else dual numbers where its
-// functions take any scalar (hybrid/scalar.hpp), else differences.
+// functions take any scalar (hybrid/guard.hpp), else differences.
 //
 //     flow_derivative([mode,] t, x, s, ds)              ds = (df/dx) s
 //     guard_derivative([which,] [mode,] t, x, s)        (dg/dx) s
@@ -27,7 +27,7 @@
 #include "ricochet/detail/directions.hpp"
 #include "ricochet/detail/dual_derivatives.hpp"
 #include "ricochet/detail/scratch.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet::detail {

@@ -25,7 +25,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "ricochet/hybrid/statistics.hpp"
+#include "ricochet/integrate/run.hpp"
 
 namespace ricochet {
 

@@ -36,7 +36,7 @@
 #include "ricochet/detail/event_motion.hpp"
 #include "ricochet/detail/linearization.hpp"
 #include "ricochet/detail/undefined.hpp"
-#include "ricochet/hybrid/event.hpp"
+#include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/integrate/options.hpp"
 

@@ -11,7 +11,7 @@
 
 #include "ricochet/detail/variational_step.hpp"
 #include "ricochet/hybrid/guard.hpp"
-#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/run.hpp"
 
 namespace ricochet {
 

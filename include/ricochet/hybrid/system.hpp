@@ -4,7 +4,7 @@
 //     guard(t, x)               g, positive inside the mode        for events
 //     guard_rate(t, x, dxdt)    dg/dt along the flow               optional; not needed where
 //                                                                  the guard takes any scalar
-//                                                                  (hybrid/scalar.hpp)
+//                                                                  (hybrid/guard.hpp)
 //     guard_curvature(t, x)     d2g/dt2 along the flow             for networks that use it
 //     reset(t, x)               x⁻ becomes x⁺, in place            optional
 //     rest(t, x)                where infinitely many events end   optional
@@ -65,7 +65,6 @@
 #include "ricochet/detail/dual_rate.hpp"
 #include "ricochet/detail/counts.hpp"
 #include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 

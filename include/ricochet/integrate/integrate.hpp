@@ -8,7 +8,8 @@ namespace ricochet {
 
 namespace detail {
 
-/// Whether a system declares an inclusion, which only the `integrate` of event_hand_over.hpp takes.
+/// Whether a system declares an inclusion, which only the `integrate` of nonsmooth/hand_over.hpp
+/// takes.
 template <class System>
 concept WantsHandOver = requires(const System& system)
 {
@@ -38,7 +39,7 @@ requires Flowing<System, X> && StateVector<X>
 {
     static_assert(!detail::WantsHandOver<System>,
                   "ricochet: found a system with set_valued(); expected the target to link "
-                  "ricochet::nonsmooth, and ricochet/nonsmooth/event_hand_over.hpp to be included, "
+                  "ricochet::nonsmooth, and ricochet/nonsmooth/hand_over.hpp to be included, "
                   "which hands it over");
     detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
                                                                      locator);

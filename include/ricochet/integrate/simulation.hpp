@@ -28,7 +28,6 @@
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/run.hpp"
-#include "ricochet/integrate/snapshot.hpp"
 #include "ricochet/locate/locators.hpp"
 
 namespace ricochet {

@@ -43,7 +43,7 @@
 
 #include "ricochet/detail/features.hpp"
 #include "ricochet/hybrid/system.hpp"
-#include "ricochet/nn/certificate.hpp"
+#include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet {

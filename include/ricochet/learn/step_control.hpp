@@ -1,5 +1,5 @@
-// Training of policies that choose steps (`nonsmooth/step_policy.hpp`). The score of a policy is
-// the work that it saves at the same true error.
+// Training of policies that choose steps (`nonsmooth/step_controllers.hpp`). The score of a policy
+// is the work that it saves at the same true error.
 //
 //     const StepFamily family = fault_family({.seed = 1});
 //     const TrainedStepPolicy trained = train_step_policy(family, {.seconds = 150});
@@ -17,10 +17,10 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/learn/evolution.hpp"
+#include "ricochet/learn/policies.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
-#include "ricochet/nonsmooth/step_policy.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {
 class DiodeCircuit;

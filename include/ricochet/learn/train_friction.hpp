@@ -16,8 +16,7 @@
 #include <vector>
 
 #include "ricochet/detail/levenberg_marquardt.hpp"
-#include "ricochet/faults/laws.hpp"
-#include "ricochet/faults/potentials.hpp"
+#include "ricochet/faults/friction.hpp"
 
 namespace ricochet::learn {
 

@@ -11,12 +11,24 @@
 // inclusion include none of these headers.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <stdexcept>
 #include <type_traits>
 
 #include "ricochet/detail/any_hand_over.hpp"
 #include "ricochet/detail/hand_over_run.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/refused_calls.hpp"
+#include "ricochet/integrate/integrate.hpp"
+
+// Defined by the library's target.
+#ifndef RICOCHET_WITH_NONSMOOTH
+#error \
+    "ricochet: nonsmooth/hand_over.hpp needs ricochet::nonsmooth, or RICOCHET_WITH_NONSMOOTH defined"
+#endif
 
 namespace ricochet {
 
@@ -91,3 +103,373 @@ RICOCHET_COMPILED_SIZES(RICOCHET_EVENTS_OF, Dopri5, extern)
 RICOCHET_EVENTS_OF(1, 1, Fehlberg78, extern)
 RICOCHET_EVENTS_OF(3, 1, Fehlberg78, extern)
 #endif
+
+namespace ricochet {
+
+// Hybrid systems that also declare their motion as an inclusion.
+//
+// A system with a flow and guards of its own may declare
+//
+//     set_valued()         an Inclusion (inclusion.hpp) of the same state
+//     start_mode(t, x)     if it has modes: the mode in which it continues from (t, x)
+//
+// `integrate` then follows its events as long as that is possible. Where it is not (switchings that
+// accumulate or chatter, a motion that presses on its guard, resets that contradict one another)
+// the inclusion takes over, as above, and hands back when none of its reactions is held
+// any more.
+//
+// The guard where a motion may come to rest must be `unilateral`, or of `either` direction and
+// without modes: only then does a motion that presses on its surface trigger an event again
+// immediately, by which the pressing is recognised. An edge-triggered guard lets that motion pass,
+// and the inclusion is never used.
+//
+// Time events of the system also happen while the inclusion is followed. Events resume after a time
+// reset that changes the state or the mode.
+//
+// Inclusions without events of their own are given to `integrate` directly.
+
+template <class System>
+concept KnowsInclusion = requires(const System& system)
+{
+    requires Inclusion<std::remove_cvref_t<decltype(system.set_valued())>>;
+};
+
+/// Result of a run. In event-driven phases `Event::guard` is a guard of the system; in set-valued
+/// phases it is the index of a reaction, and both modes of the event are the mode before the phase.
+template <class X>
+struct MixedRun {
+    Outcome outcome = Outcome::reached_end;
+    double t = 0;
+    X x{};
+    Mode mode = 0;
+    std::vector<Event<X>> events;
+    std::vector<Phase> phases;
+    Trajectory<X> trajectory;  ///< at the sample times
+    HandOverStatistics statistics;
+    StageReport failure;  ///< set with `not_converged`
+};
+
+namespace detail {
+
+template <class To, class From>
+[[nodiscard]] To converted_state(const From& from, To like)
+{
+    for (std::size_t i = 0; i < static_cast<std::size_t>(from.size()); ++i) {
+        like[static_cast<decltype(like.size())>(i)] = from[static_cast<decltype(from.size())>(i)];
+    }
+    return like;
+}
+
+/// Whether a guard without a reset of the state switches within the resolution of the steps: 200
+/// crossings in a row between which the guard moves, on average, at most a thousand times the
+/// error of a step. Error control then determines the number of switches, not the motion.
+class SwitchingWatch {
+public:
+    /// Reviews the events recorded so far; `error` is the error of a step.
+    template <class X, class Error>
+    [[nodiscard]] bool operator()(const std::vector<Event<X>>& events, const Error& error)
+    {
+        for (; seen_ < events.size(); ++seen_) {
+            const Event<X>& event = events[seen_];
+            const bool switches =
+                event.kind == EventKind::crossing && same_state(event.after, event.before);
+            // The excursion of a parabola between two zeros.
+            if (switches && count_ > 0) excursions_ += std::abs(event.slope * (event.t - t_)) / 4;
+            t_ = event.t;
+            if (!switches) count_ = 0;
+            if (switches) ++count_;
+            if (count_ > most_events) {
+                if (excursions_ <= most_events * 1000 * error()) return true;
+                count_ = 1;
+            }
+            if (count_ <= 1) excursions_ = 0;
+        }
+        return false;
+    }
+
+private:
+    static constexpr int most_events = 200;
+    std::size_t seen_ = 0;
+    int count_ = 0;
+    double t_ = 0;
+    double excursions_ = 0;
+};
+
+}  // namespace detail
+
+template <KnowsInclusion System, class X, class Stepping = ErrorControlled<Dopri5>,
+          class Detector = Extremum, class Locator = Newton>
+class EventHandOver {
+public:
+    using Set = std::remove_cvref_t<decltype(std::declval<const System&>().set_valued())>;
+    using Vector = StateOf<Set>;
+
+    EventHandOver(const System& system, const X& x0, const Options& options,
+                  const Stepping& stepping, const Detector& detector, const Locator& locator)
+        : system_(system),
+          set_(system.set_valued()),
+          options_(options),
+          hand_over_(detail::completed(hand_over_options(options), false)),
+          stepping_(stepping),
+          detector_(detector),
+          locator_(locator)
+    {
+        static_assert(
+            !Moded<System, X> || requires(Mode & mode) { mode = system.start_mode(0.0, x0); },
+            "ricochet: found a system with modes and set_valued(); expected Mode "
+            "start_mode(double t, const State& x) const as well, the mode after it");
+        for (std::size_t i = 0; i < guard_count_of<X>(system); ++i) {
+            if (guard_info_of<X>(system, i).stop_after > 1) {
+                throw std::invalid_argument(
+                    "integrate: a run that may be handed over counts the events of a guard in "
+                    "each phase by itself, and has no stop_after above 1");
+            }
+        }
+        run_.t = options.t_start;
+        run_.x = x0;
+        run_.mode = options.mode;
+        hand_over_.until_released = true;
+    }
+
+    /// Advances to the end and returns the result, whatever the outcome.
+    [[nodiscard]] MixedRun<X> take()
+    {
+        bool ended = false;
+        PhaseCause cause = PhaseCause::start;
+        while (!ended) {
+            run_.phases.push_back({.from = run_.t, .set_valued = false, .cause = cause});
+            if (const auto end = follow_events()) {
+                ended = follow_inclusion(*end);
+                cause = PhaseCause::released;
+                if (!ended) ++run_.statistics.to_events;
+            } else {
+                ended = true;
+            }
+        }
+        return std::move(run_);
+    }
+
+private:
+    /// Reason for which the inclusion is to continue; empty if the run is over.
+    [[nodiscard]] std::optional<PhaseCause> follow_events()
+    {
+        if (steps_taken() >= options_.max_steps) {
+            run_.outcome = Outcome::step_limit;
+            return std::nullopt;
+        }
+        Options options = options_;
+        options.t_start = run_.t;
+        options.mode = run_.mode;
+        options.sample_times = remaining_samples();
+        options.max_steps = options_.max_steps - steps_taken();
+        using Loop = Simulation<System, X, Stepping, Detector, Locator>;
+        std::optional<Loop> simulation;
+        try {
+            simulation.emplace(system_, run_.x, options, stepping_, detector_, locator_);
+        } catch (const std::invalid_argument&) {
+            if (run_.phases.size() == 1) throw;  // an invalid argument of the caller
+            return PhaseCause::stuck;
+        }
+        detail::ChatterWatch watch(run_.t, hand_over_.set_valued.step / 100);
+        detail::SwitchingWatch switches;
+        bool chatters = false;
+        while (!chatters && simulation->step()) {
+            chatters =
+                watch(simulation->t(), simulation->run().statistics.events) ||
+                switches(simulation->run().events, [&] { return error_of(simulation->x()); });
+        }
+        Run<X> done = simulation->finish();
+        run_.t = done.t;
+        run_.x = done.x;
+        run_.mode = done.mode;
+        std::move(done.events.begin(), done.events.end(), std::back_inserter(run_.events));
+        append(done.trajectory);
+        detail::add(run_.statistics.event_driven, done.statistics);
+        if (chatters) return PhaseCause::chattering;
+        if (const auto cause = detail::cause_after(done.outcome)) return cause;
+        run_.outcome = done.outcome;
+        return std::nullopt;
+    }
+
+    /// Whether the run is over.
+    bool follow_inclusion(PhaseCause cause)
+    {
+        const double from = run_.t;
+        run_.phases.push_back({.from = from, .set_valued = true, .cause = cause});
+        ++run_.statistics.to_set_valued;
+        double due = next_time_event();
+        while (follow_inclusion_until(due)) {
+            bool changes = false;
+            if (!apply_time_event(due, changes)) return true;
+            if (changes) return false;
+            due = next_time_event();
+        }
+        if (run_.outcome != Outcome::released) return true;
+        if (!(run_.t > from)) {
+            // The inclusion holds no reaction, and the event-driven run cannot continue from this
+            // state.
+            run_.outcome = Outcome::not_handed_over;
+            return true;
+        }
+        if constexpr (Moded<System, X>) run_.mode = system_.start_mode(run_.t, run_.x);
+        return false;
+    }
+
+    /// Follows the inclusion, at most until the time event that is due next; whether it was
+    /// reached.
+    bool follow_inclusion_until(double due)
+    {
+        if (!(due > run_.t)) {
+            run_.outcome = Outcome::time_event_not_ahead;
+            return false;
+        }
+        const bool stops = due <= options_.t_end;
+        HandOverOptions options = hand_over_;
+        options.t_start = run_.t;
+        options.sample_times = remaining_samples();
+        if (stops) {
+            options.t_end = due;
+            // A sample at the time of an event shows the state after it.
+            std::erase_if(options.sample_times, [&](double t) { return t >= due; });
+        }
+        options.max_steps -= std::min(options.max_steps, steps_taken());
+        Vector w(static_cast<Eigen::Index>(run_.x.size()));
+        w = detail::converted_state(run_.x, w);
+        HandOver<Set> inclusion(set_, w, options);
+        HandOverRun<Set> done = inclusion.take();
+        for (const auto& event : done.events) run_.events.push_back(converted(event));
+        for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
+            run_.trajectory.t.push_back(done.trajectory.t[i]);
+            run_.trajectory.x.push_back(detail::converted_state(done.trajectory.x[i], run_.x));
+        }
+        detail::add(run_.statistics.event_driven, done.statistics.event_driven);
+        detail::add(run_.statistics.set_valued, done.statistics.set_valued);
+        run_.statistics.set_valued_time += done.state.t - run_.t;
+        run_.t = done.state.t;
+        run_.x = detail::converted_state(done.state.w, run_.x);
+        run_.failure = done.failure;
+        run_.outcome = done.outcome;
+        return stops && done.outcome == Outcome::reached_end;
+    }
+
+    // --- time events while the inclusion is followed ---
+
+    /// The next time event; infinite if there is none.
+    [[nodiscard]] double next_time_event() const
+    {
+        if constexpr (Timed<System>) {
+            return system_.next_time_event(run_.t);
+        } else {
+            return std::numeric_limits<double>::infinity();
+        }
+    }
+
+    /// Records a time event and applies its reset. Events resume where that changes the state or
+    /// the mode. False if the run ends.
+    bool apply_time_event(double t, bool& changes)
+    {
+        Event<X> event;
+        event.t = t;
+        event.kind = EventKind::time;
+        event.guard = no_guard;
+        event.before = event.after = run_.x;
+        event.bracket = {t, t};
+        Mode mode = run_.mode;
+        if constexpr (Moded<System, X>) mode = system_.start_mode(t, run_.x);
+        event.mode_before = mode;
+        event.mode_after = detail::call_time_reset(system_, mode, t, event.after);
+        changes = event.mode_after != mode || event.after.size() != event.before.size() ||
+                  !detail::same_state(event.after, event.before);
+        if (changes) {
+            run_.x = event.after;
+            run_.mode = event.mode_after;
+        }
+        ++run_.statistics.event_driven.events;
+        if (options_.record_events) run_.events.push_back(event);
+        if (event.after.size() != event.before.size()) {
+            run_.outcome = Outcome::wrong_dimension;
+            return false;
+        }
+        if (!detail::all_finite(event.after)) {
+            run_.outcome = Outcome::non_finite;
+            return false;
+        }
+        return true;
+    }
+
+    /// Error of a step that ends at state x.
+    [[nodiscard]] double error_of(const X& x) const
+    {
+        double largest = 0;
+        for (const double component : x) largest = std::max(largest, std::abs(component));
+        return options_.atol + options_.rtol * largest;
+    }
+
+    /// Number of steps of both kinds, including attempts.
+    [[nodiscard]] std::uint64_t steps_taken() const noexcept
+    {
+        return run_.statistics.event_driven.steps + run_.statistics.set_valued.attempted;
+    }
+
+    [[nodiscard]] Event<X> converted(const Event<Vector>& from) const
+    {
+        Event<X> event;
+        event.t = from.t;
+        event.kind = from.kind;
+        event.guard = from.guard;
+        event.mode_before = event.mode_after = run_.mode;
+        event.before = detail::converted_state(from.before, run_.x);
+        event.after = detail::converted_state(from.after, run_.x);
+        event.bracket = from.bracket;
+        event.slope = from.slope;
+        event.error = from.error;
+        return event;
+    }
+
+    [[nodiscard]] std::vector<double> remaining_samples() const
+    {
+        const auto done = static_cast<std::ptrdiff_t>(run_.trajectory.t.size());
+        return {options_.sample_times.begin() + done, options_.sample_times.end()};
+    }
+    void append(const Trajectory<X>& more)
+    {
+        run_.trajectory.t.insert(run_.trajectory.t.end(), more.t.begin(), more.t.end());
+        run_.trajectory.x.insert(run_.trajectory.x.end(), more.x.begin(), more.x.end());
+    }
+
+    const System& system_;
+    Set set_;
+    Options options_;
+    HandOverOptions hand_over_;
+    Stepping stepping_;
+    Detector detector_;
+    Locator locator_;
+    MixedRun<X> run_;
+};
+
+/// Integrates by events as far as possible, and by the inclusion where events cannot continue.
+///
+/// @throws std::invalid_argument as for other systems; also for `stop_at_event`, `record_steps`, a
+///         `stop_after` above 1 and a backward run, which a hand-over does not support.
+template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
+          class Detector = Extremum, class Locator = Newton>
+requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
+[[nodiscard]] MixedRun<X> integrate(const System& system, const X& x0, const Options& options,
+                                    const Stepping& stepping = {}, const Detector& detector = {},
+                                    const Locator& locator = {})
+{
+    return EventHandOver<System, X, Stepping, Detector, Locator>(system, x0, options, stepping,
+                                                                 detector, locator)
+        .take();
+}
+
+/// Runs an inclusion alone: `hand_over`.
+template <class System, class X, class Stepping = ErrorControlled<Dopri5>>
+requires NotIntegrable<System, X> && Inclusion<System>
+[[nodiscard]] HandOverRun<System> integrate(const System& system, const X& w0,
+                                            const Options& options, const Stepping& stepping = {})
+{
+    return hand_over(system, StateOf<System>(w0), hand_over_options(options), stepping);
+}
+
+}  // namespace ricochet

@@ -18,8 +18,7 @@
 #include "ricochet/detail/debug_checks.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/minimal_selection.hpp"
-#include "ricochet/detail/step_layout.hpp"
-#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/run.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {

@@ -1,3 +1,21 @@
+// Rules that choose the next step: classical ones, and a network that changes their proposal.
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "ricochet/detail/step_control.hpp"
+#include "ricochet/nn/mlp.hpp"
+
+namespace ricochet {
+
 // Rules that choose the next step from the errors of the last ones.
 //
 // A controller is a value. It receives every attempt, either the error of a step,
@@ -9,17 +27,6 @@
 //     void reset()                     forgets the past, as after a jump of the motion
 //
 // Some of these rules accept steps of an error above 1, and some reject below it.
-#pragma once
-
-#include <array>
-#include <cstdint>
-#include <memory>
-#include <variant>
-#include <vector>
-
-#include "ricochet/detail/step_control.hpp"
-
-namespace ricochet {
 
 /// Decision of a step controller: whether the step is accepted, and the factor of the next length.
 struct StepVerdict {
@@ -173,7 +180,7 @@ struct StepView {
     std::array<double, state_inputs> state{};  ///< inputs from its end, as the system declares them
 };
 
-/// A learned rule: the factor of `plain` times that of a policy (`nonsmooth/step_policy.hpp`). A
+/// A learned rule: the factor of `plain` times that of a `StepPolicy`. A
 /// step of an error above `plain.reject_above` is rejected. The factors after a rejection, and
 /// where the policy returns none, are those of `plain`.
 struct LearnedStep {
@@ -208,5 +215,113 @@ template <class View>
 /// @throws std::invalid_argument for an order below 1, factors that do not shrink or grow, infinite
 /// or NaN exponents, a learned rule without a policy, or prescribed steps that are not positive.
 void validate(const StepController& controller);
+
+// Description of the data that a system provides to a rule that chooses steps.
+
+/// An input of a policy and its typical range. The network receives (input - `centre`) / `width`.
+struct StepInput {
+    std::string_view name;
+    double centre = 0;
+    double width = 1;
+};
+
+/// Inputs of the policies of one system.
+struct StepLayout {
+    std::string_view system;  ///< e.g. "fault"
+    int version = 1;          ///< of the meaning of the names
+    std::array<StepInput, StepView::state_inputs> state;
+
+    /// Text in a model file: "step-inputs-1: log_error log_tolerance ...".
+    [[nodiscard]] std::string recipe() const;
+};
+
+/// A system that declares inputs for policies: `step_inputs(t, w, rate, reaction, out)` at the end
+/// of a step, with the rate of w there, and the unit of time [s] in which steps are measured.
+template <class System, class State, class Reaction>
+concept DeclaresStepInputs = requires(const System& system, double t, const State& w,
+                                      const Reaction& reaction,
+                                      std::array<double, StepView::state_inputs>& out)
+{
+    {
+        System::step_layout()
+        } -> std::convertible_to<const StepLayout&>;
+    {
+        system.step_unit()
+        } -> std::convertible_to<double>;
+    system.step_inputs(t, w, w, reaction, out);
+};
+
+// A network that lengthens or shortens the steps of a classical controller.
+//
+//     const auto policy = std::make_shared<const StepPolicy>(load_model("fault-step.safetensors"));
+//     BatheOptions{.controller = LearnedStep{policy}, .estimate = ErrorEstimate::embedded}
+//
+// The classical proposal h 0.9 E^(-1/3) is multiplied by exp(network), held within [e^-2, e^2].
+// The inputs of the network are intensive, means over a field rather than sums, so that a
+// policy trained on one element serves any mesh. The policy decides only about lengths: whatever
+// its weights, a step whose error is too large is rejected and repeated by the classical rule. That
+// rule also decides where an input is NaN or outside of the range seen in training.
+
+/// The range of every input that was met in training.
+class StepRanges {
+public:
+    static constexpr std::size_t inputs = 4 + StepView::state_inputs;
+    using Inputs = std::array<double, inputs>;
+
+    /// Widens the ranges to hold `inputs`, or those of `other`.
+    void include(const Inputs& inputs) noexcept;
+    void include(const StepRanges& other) noexcept;
+    [[nodiscard]] bool empty() const noexcept { return !(lower_[0] <= upper_[0]); }
+    /// One interval per input, widened by this fraction of its width on both sides.
+    [[nodiscard]] std::vector<Interval> domain(double margin) const;
+
+private:
+    Inputs lower_ = filled(1);
+    Inputs upper_ = filled(-1);
+
+    static constexpr Inputs filled(double sign)
+    {
+        Inputs out{};
+        for (double& value : out) value = sign * 1e300;
+        return out;
+    }
+};
+
+/// A loaded policy. Immutable; threads may share it.
+class StepPolicy {
+public:
+    static constexpr std::string_view kind = "step-policy";
+    static constexpr std::size_t inputs = StepRanges::inputs;
+    static constexpr double most = 2;  ///< largest |log factor|
+
+    /// @throws std::invalid_argument if the model is of another kind, if it does not have
+    /// `inputs` inputs and one output, or as `Mlp`.
+    explicit StepPolicy(Model model);
+
+    /// @throws std::invalid_argument if the policy is for another system or layout, naming both.
+    void require(const StepLayout& layout) const;
+
+    /// Returns log E, log tolerance, log step, the fraction switched, and the inputs of the system.
+    [[nodiscard]] static StepRanges::Inputs inputs_of(double error, const StepView& view) noexcept;
+
+    /// Factor for the classical proposal, in [e^-2, e^2]. Empty if an input is
+    /// outside of the domain, or the network's output is not a number.
+    [[nodiscard]] std::optional<double> factor(const StepRanges::Inputs& inputs) const noexcept;
+
+    [[nodiscard]] const Model& model() const noexcept { return model_; }
+
+private:
+    Model model_;
+    Mlp<double> network_;
+};
+
+/// A model of that layout with these weights, to be trained or saved: 10-8-8-1, tanh, in double;
+/// an empty list is a network that returns zero. Weights of each layer row by row, then biases.
+/// @throws std::invalid_argument for another number of weights.
+[[nodiscard]] Model step_policy_model(const StepLayout& layout, const std::vector<double>& weights);
+
+/// Number of weights of that network.
+inline constexpr std::size_t step_policy_weights =
+    (StepPolicy::inputs + 1) * 8 + 9 * std::size_t{8} + 9;
 
 }  // namespace ricochet

@@ -6,10 +6,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/run.hpp"
 #include "ricochet/scene/scene.hpp"
 
 namespace ricochet {
@@ -20,7 +22,7 @@ enum class ImpactLaw {
     together,  ///< Newton's law for all contacts at once
 };
 
-/// Maker of groups of bodies in lasting contact (scene/contact.hpp).
+/// Maker of groups of bodies in lasting contact, see `scene_contacts()`.
 class SceneContacts;
 
 /// Options of a run of a scene.
@@ -129,5 +131,38 @@ struct SceneRun {
 /// Energy [J] of the bodies that are not part of systems: kinetic, and potential of gravity and
 /// springs. `bodies` holds one state for each body of the scene.
 [[nodiscard]] double energy(const Scene& scene, const std::vector<BodyState>& bodies);
+
+// Lasting contact of the bodies of a scene: stacks, sleeping bodies that lean on each other, chains
+// over an edge. Requires the contact solver; link the separate library `ricochet::scene_contact`.
+
+/// Solver of lasting contacts, by Moreau's time stepping with steps `SceneOptions::contact_step`:
+///
+///     simulate(scene, {.t_end = 10, .contacts = scene_contacts()})
+///
+/// Never null; valid as long as the program runs.
+[[nodiscard]] const SceneContacts* scene_contacts() noexcept;
+
+// Scenes as JSON text.
+
+/// Error in the text of a scene. The message is one sentence that begins with file and line:
+/// "bin.json:12: expected a number for "radius", found "big"".
+class SceneFileError : public std::runtime_error {
+public:
+    using std::runtime_error::runtime_error;
+};
+
+/// A scene and the options of its run, as read from a file.
+struct SceneFile {
+    Scene scene;
+    SceneOptions options;  ///< from "run"; t_end is NaN if it is not given
+};
+
+/// Reads the scene that `text` describes (docs/scenes.md lists the keys). Error messages name the
+/// text `file`.
+/// @throws SceneFileError if `text` is not JSON, or is not a valid scene.
+[[nodiscard]] SceneFile read_scene(std::string_view text, std::string_view file = "scene");
+
+/// Reads a scene from a file. @throws SceneFileError also if the file cannot be read.
+[[nodiscard]] SceneFile load_scene(const std::string& path);
 
 }  // namespace ricochet

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "ricochet/detail/step_layout.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {
 

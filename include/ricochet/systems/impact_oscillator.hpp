@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/scalar.hpp"
 
 namespace ricochet {
 

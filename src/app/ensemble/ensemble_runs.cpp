@@ -10,7 +10,7 @@
 #include "../../files/read_file.hpp"
 #include "../input.hpp"
 #include "ricochet/ensemble.hpp"
-#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/run.hpp"
 
 namespace ricochet::app {
 

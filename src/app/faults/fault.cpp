@@ -16,7 +16,7 @@
 #include "plot.hpp"
 #include "policy_lookup.hpp"
 #include "report.hpp"
-#include "ricochet/faults/fault_bathe.hpp"
+#include "ricochet/faults/strike_slip_fault.hpp"
 #include "run_watch.hpp"
 #include "simulate.hpp"
 #include "step_progress.hpp"

@@ -2,7 +2,7 @@
 
 #include "input.hpp"
 #include "registry.hpp"
-#include "ricochet/learn/bouncing_ball.hpp"
+#include "ricochet/learn/classifier.hpp"
 #include "settings.hpp"
 #include "train.hpp"
 

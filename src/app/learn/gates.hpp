@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "registry.hpp"
-#include "ricochet/learn/gate.hpp"
+#include "ricochet/learn/classifier.hpp"
 #include "train.hpp"
 
 namespace ricochet::app {

@@ -3,7 +3,7 @@
 #pragma once
 
 #include "../settings.hpp"
-#include "ricochet/integrate/outcome.hpp"
+#include "ricochet/integrate/run.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 
 namespace ricochet::app {

@@ -12,7 +12,7 @@
 #include "../interrupt.hpp"
 #include "../plot.hpp"
 #include "../run_watch.hpp"
-#include "ricochet/scene/contact.hpp"
+#include "ricochet/scene/simulate.hpp"
 #include "scene_pictures.hpp"
 
 namespace ricochet::app {

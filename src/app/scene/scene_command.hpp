@@ -7,7 +7,7 @@
 #include <string>
 
 #include "../report.hpp"
-#include "ricochet/scene/json.hpp"
+#include "ricochet/scene/simulate.hpp"
 
 namespace CLI {
 class App;

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "ricochet/scene/json.hpp"
+#include "ricochet/scene/simulate.hpp"
 
 namespace ricochet::app {
 

@@ -9,7 +9,6 @@
 
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detect/gates.hpp"
-#include "ricochet/detect/network.hpp"
 #include "setup.hpp"
 
 namespace ricochet::python {

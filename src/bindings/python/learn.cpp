@@ -21,8 +21,7 @@
 #include "background.hpp"
 #include "door_system.hpp"
 #include "ricochet/learn/certify.hpp"
-#include "ricochet/learn/train_classifier.hpp"
-#include "ricochet/learn/train_gate.hpp"
+#include "ricochet/learn/train.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace py = pybind11;

@@ -4,9 +4,8 @@
 #include <memory>
 #include <optional>
 
-#include "ricochet/detail/classifier.hpp"
 #include "ricochet/detail/gate.hpp"
-#include "ricochet/nn/certificate.hpp"
+#include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::python {

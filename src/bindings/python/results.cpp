@@ -13,8 +13,7 @@
 #include <utility>
 
 #include "bindings.hpp"
-#include "ricochet/integrate/outcome.hpp"
-#include "ricochet/integrate/snapshot.hpp"
+#include "ricochet/integrate/run.hpp"
 
 namespace ricochet::python {
 

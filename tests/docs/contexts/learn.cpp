@@ -2,7 +2,6 @@
 #include <ricochet/detail/random.hpp>
 #include <ricochet/detail/step_environment.hpp>
 #include <ricochet/faults/strike_slip_fault.hpp>
-#include <ricochet/learn/evolution.hpp>
 #include <ricochet/learn/policies.hpp>
 #include <ricochet/nn/model.hpp>
 

@@ -2,7 +2,7 @@
 #include <array>
 #include <cmath>
 
-#include <ricochet/learn/train_gate.hpp>
+#include <ricochet/learn/train.hpp>
 #include <ricochet/ricochet.hpp>
 
 using namespace ricochet;
