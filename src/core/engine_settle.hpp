@@ -132,6 +132,7 @@ inline void EventEngine<X, single>::arm_all()
             bank_.arm(i, Side::plateau);
             continue;
         }
+        if (!single && bank_.stays_armed(i)) continue;
         if (!arm_one(i, widest)) return;
     }
 }

@@ -248,6 +248,24 @@ public:
         as_screened_ = false;
     }
 
+    /// Arms a guard that a set has left as it was, on the side on which it is by more than its
+    /// event tolerance, as most of many guards are. Returns false, and does nothing, for others.
+    [[nodiscard]] bool stays_armed(std::size_t i) noexcept
+    {
+        GuardRecord& record = records_[i];
+        const double g = g0_[i];
+        const bool as_before = !record.fired && !record.newly_enabled && side_of(g) == record.side;
+        const bool clear = std::fabs(g) > record.band && is_finite(g);
+        const bool kept_out = record.info.unilateral && record.side == Side::below;
+        if (!(as_before && clear) || kept_out || record.deferred) return false;
+        record.estimated = false;
+        record.departs = false;
+        record.from = 0;
+        sign_[i] = sign_of(record.side);
+        as_screened_ = false;
+        return true;
+    }
+
     /// Width [s] below which a bracket in a step of length h is dominated by the guard's
     /// rounding, for guards whose brackets are not narrowed further; else 0.
     [[nodiscard]] double unresolved(std::size_t i, double h) const noexcept

@@ -8,6 +8,7 @@
 // bouncing ball that is a third of the time of a step.
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <tuple>
 #include <utility>
@@ -73,10 +74,28 @@ template <class X>
     }
 }
 
+/// As `move`, for components that lie side by side, in registers as wide as there are.
+void move_many(double* to, const double* from, double factor, const double* direction,
+               std::size_t count) noexcept;
+
+/// A state of doubles side by side, whose number is not small. (Eigen's may be rows of a matrix.)
+template <class X>
+concept LongArray = !is_small<X> && !requires { X::SizeAtCompileTime; } && requires(X& x)
+{
+    {
+        x.data()
+        } -> std::same_as<double*>;
+};
+
 /// to = from + factor * direction.
 template <class X>
 [[gnu::always_inline]] inline void move(X& to, const X& from, double factor, const X& direction)
 {
+    if constexpr (LongArray<X>) {
+        if (from.size() > 8) {
+            return move_many(to.data(), from.data(), factor, direction.data(), from.size());
+        }
+    }
     for_each_component(from, [&](auto i) { to[i] = from[i] + factor * direction[i]; });
 }
 
