@@ -42,6 +42,7 @@ LazyTape::LazyTape(std::size_t states, const Recording& as_called, std::vector<i
     find_degrees(tape_);
     mark_for_guards(tape_);
     degree_ = polynomial_order(tape_);
+    combine_sums();
     arrange();
 }
 
@@ -56,9 +57,14 @@ int LazyTape::repeated(TapeOp& op, double& constant) const
     bool vanishes = false;
     switch (op.op) {
         case TaylorOp::sum: return is_zero(op.a) ? op.b : is_zero(op.b) ? op.a : -1;
-        case TaylorOp::difference: return is_zero(op.b) ? op.a : -1;
+        case TaylorOp::difference:
+            if (is_zero(op.a)) op = {.op = TaylorOp::negative, .a = op.b};
+            return op.b >= 0 && is_zero(op.b) ? op.a : -1;
         case TaylorOp::plus_constant:
         case TaylorOp::minus_constant: return constant == 0 ? op.a : -1;
+        case TaylorOp::constant_minus:
+            if (constant == 0) op = {.op = TaylorOp::negative, .a = op.a};
+            return -1;
         case TaylorOp::times_constant:
         case TaylorOp::over_constant:
             if (constant == 1) return op.a;
@@ -114,6 +120,8 @@ void LazyTape::simplify(const Recording& recording)
 
 void LazyTape::add_partners()
 {
+    const auto has_partner = [](const TapeOp& op) { return is_function(op.op); };
+    if (std::ranges::none_of(tape_.ops, has_partner)) return;
     std::map<std::pair<TaylorOp, int>, int> known;
     for (std::size_t i = tape_.states + 1; i < tape_.ops.size(); ++i) {
         known.emplace(std::pair(tape_.ops[i].op, tape_.ops[i].a), static_cast<int>(i));
@@ -142,6 +150,63 @@ void LazyTape::add_partners()
             default: break;
         }
         tape_.ops[i].b = b;
+    }
+}
+
+/// An operand of a sum: where it is used nowhere else, a multiple of another operation.
+LazyTape::Term LazyTape::term(int i, const std::vector<int>& uses)
+{
+    const auto at = static_cast<std::size_t>(i);
+    const TapeOp& op = tape_.ops[at];
+    const bool opposite = op.op == TaylorOp::negative;
+    const bool multiple = op.op == TaylorOp::times_constant || op.op == TaylorOp::over_constant;
+    if (!(opposite || multiple) || uses[at] > 1) return {at, 1};
+    absorbed_[at] = true;
+    if (multiple) return {static_cast<std::size_t>(op.a), constants_[at]};
+    const Term of = term(op.a, uses);
+    return {of.of, -of.factor};
+}
+
+/// Combines sums of sums, and of multiples, in the order in which they are added.
+void LazyTape::combine_sums()
+{
+    std::vector<int> uses(tape_.ops_count, 0);
+    for (const TapeOp& op : tape_.ops) {
+        for (const int operand : {op.a, op.b, op.c}) {
+            if (operand >= 0) ++uses[static_cast<std::size_t>(operand)];
+        }
+    }
+    for (const int output : tape_.outputs) ++uses[static_cast<std::size_t>(output)];
+    terms_.assign(tape_.ops_count, {});
+    absorbed_.assign(tape_.ops_count, false);
+    for (std::size_t i = tape_.states + 1; i < tape_.ops_count; ++i) {
+        const TapeOp& op = tape_.ops[i];
+        const bool sum = op.op == TaylorOp::sum;
+        if (!sum && op.op != TaylorOp::difference) continue;
+        const auto goes_on = [&](int operand) {
+            const auto at = static_cast<std::size_t>(operand);
+            return !terms_[at].empty() && uses[at] == 1;
+        };
+        const bool of_b = sum && goes_on(op.b) && !goes_on(op.a);
+        const auto first = static_cast<std::size_t>(of_b ? op.b : op.a);
+        Term next = term(of_b ? op.a : op.b, uses);
+        if (!sum) next.factor = -next.factor;
+        if (goes_on(static_cast<int>(first))) {
+            terms_[i] = std::move(terms_[first]);
+            terms_[first].clear();
+            absorbed_[first] = true;
+        } else {
+            terms_[i].push_back(term(static_cast<int>(first), uses));
+        }
+        terms_[i].push_back(next);
+    }
+    for (std::size_t i = 0; i < tape_.ops_count; ++i) {
+        const std::vector<Term>& terms = terms_[i];
+        const auto is = [&](const Term& term, int operand) {
+            return std::fabs(term.factor) == 1 && static_cast<int>(term.of) == operand;
+        };
+        const TapeOp& op = tape_.ops[i];
+        if (terms.size() == 2 && is(terms[0], op.a) && is(terms[1], op.b)) terms_[i].clear();
     }
 }
 

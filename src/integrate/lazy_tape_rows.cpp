@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/wide.hpp"
 #include "ricochet/detail/lazy_tape.hpp"
 #include "ricochet/detail/taylor_sums.hpp"
 
@@ -18,16 +19,18 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Operations begin at even places, so that two are computed at a time.
-[[nodiscard]] std::size_t even(std::size_t place) noexcept
+/// Operations of one kind begin at multiples of four, and as many are computed at a time.
+[[nodiscard]] std::size_t whole(std::size_t place) noexcept
 {
-    return place + place % 2;
+    return (place + 3) / 4 * 4;
 }
 /// The largest number of terms in a sum.
 constexpr std::size_t most_terms = most_taylor_order + 1;
 
-/// Two doubles, of which the first has an even place.
-typedef double Pair __attribute__((vector_size(2 * sizeof(double)), may_alias));
+/// Four doubles, in one register or in two.
+typedef double Four __attribute__((vector_size(32)));
+/// The same in a row, where the first has an even place.
+typedef Four InRow __attribute__((aligned(16), may_alias));
 
 /// The terms of a sum: j times the width of a row for each, and their factors if there are any.
 struct TermsOfRows {
@@ -36,40 +39,46 @@ struct TermsOfRows {
     const double* weights;
 };
 
-template <std::size_t pairs, bool weighted>
+template <std::size_t fours, bool weighted>
 [[gnu::always_inline]] inline void sum_block(const double* a, const double* b,
                                              const TermsOfRows& terms, double* sums)
 {
-    Pair sum[pairs];  // NOLINT(*-avoid-c-arrays): std::array would lose the attributes
-    const auto with_terms = [&](std::size_t i, const auto& put) {
-        const auto* const left = reinterpret_cast<const Pair*>(a + terms.offsets[i]);
-        const auto* right = reinterpret_cast<const Pair*>(b - terms.offsets[i]);
+    Four sum[fours];  // NOLINT(*-avoid-c-arrays): std::array would lose the attributes
+    const auto with_terms = [&](std::size_t i, const auto& put) __attribute__((always_inline))
+    {
+        const InRow* const left = reinterpret_cast<const InRow*>(a + terms.offsets[i]);
+        const InRow* right = reinterpret_cast<const InRow*>(b - terms.offsets[i]);
         asm("" : "+r"(right));  // else g++ computes every address again
-        for (std::size_t l = 0; l < pairs; ++l) {
-            put(sum[l], weighted ? terms.weights[i] * left[l] * right[l] : left[l] * right[l]);
+        for (std::size_t l = 0; l < fours; ++l) {
+            if constexpr (weighted)
+                put(sum[l], Four(terms.weights[i] * left[l] * right[l]));
+            else
+                put(sum[l], Four(left[l] * right[l]));
         }
     };
-    with_terms(0, [](Pair& to, Pair term) { to = term; });
+    with_terms(
+        0, [](Four & to, const Four& term) __attribute__((always_inline)) { to = term; });
     for (std::size_t i = 1; i < terms.count; ++i) {
-        with_terms(i, [](Pair& to, Pair term) { to += term; });
+        with_terms(
+            i, [](Four & to, const Four& term) __attribute__((always_inline)) { to += term; });
     }
-    for (std::size_t l = 0; l < pairs; ++l) reinterpret_cast<Pair*>(sums)[l] = sum[l];
+    for (std::size_t l = 0; l < fours; ++l) reinterpret_cast<InRow*>(sums)[l] = sum[l];
 }
 
-/// In each lane the sum of weight_j a_j b_{-j}.
+/// In each lane, and in those that fill up the last four, the sum of weight_j a_j b_{-j}.
 template <bool weighted>
-void sum_rows(const double* a, const double* b, const TermsOfRows& terms, std::size_t lanes,
-              double* sums)
+RICOCHET_WIDE void sum_rows(const double* a, const double* b, const TermsOfRows& terms,
+                            std::size_t lanes, double* sums)
 {
-    const std::size_t pairs = (lanes + 1) / 2;
+    const std::size_t fours = (lanes + 3) / 4;
     std::size_t l = 0;
-    for (; l + 8 <= 2 * pairs; l += 8) {
-        sum_block<4, weighted>(a + l, b + l, terms, sums + l);
-    }
-    switch (pairs % 4) {
+    for (; l + 24 <= 4 * fours; l += 24) sum_block<6, weighted>(a + l, b + l, terms, sums + l);
+    switch (fours % 6) {
         case 1: return sum_block<1, weighted>(a + l, b + l, terms, sums + l);
         case 2: return sum_block<2, weighted>(a + l, b + l, terms, sums + l);
         case 3: return sum_block<3, weighted>(a + l, b + l, terms, sums + l);
+        case 4: return sum_block<4, weighted>(a + l, b + l, terms, sums + l);
+        case 5: return sum_block<5, weighted>(a + l, b + l, terms, sums + l);
         default: return;
     }
 }
@@ -112,17 +121,32 @@ LazyTape::Lane LazyTape::lane(std::size_t a, std::size_t b) noexcept
 /// Operations of one kind, with operands of the same degrees, that depend on earlier ones alone.
 std::vector<LazyTape::Batch> LazyTape::batches() const
 {
-    using Kind = std::tuple<int, TaylorOp, std::uint64_t, int, int, int, int>;
+    using Kind = std::tuple<int, TaylorOp, std::uint64_t, std::size_t, int, int, int, int>;
     std::map<Kind, Batch> kinds;
     std::vector<int> levels(tape_.ops_count, 0);
     for (std::size_t i = tape_.states + 1; i < tape_.ops_count; ++i) {
+        if (absorbed_[i]) continue;
         const TapeOp& op = tape_.ops[i];
+        const auto follow = [&](std::size_t operand) {
+            levels[i] = std::max(levels[i], levels[operand] + 1);
+        };
+        for (const Term& term : terms_[i]) follow(term.of);
+        if (!terms_[i].empty()) {
+            Batch& batch =
+                kinds[{levels[i], TaylorOp::sum, 0, terms_[i].size(), 0, 0, 0, tape_.degree[i]}];
+            batch.pass = Pass::combination;
+            batch.op = TaylorOp::sum;
+            batch.degree = tape_.degree[i];
+            batch.for_guards = batch.for_guards || tape_.for_guards[i];
+            batch.ops.push_back(i);
+            continue;
+        }
         for (const int operand : {op.a, op.b, op.c}) {
             // Of sin and cos, each is an operand of the other.
             if (operand < 0 || static_cast<std::size_t>(operand) >= i) continue;
-            levels[i] = std::max(levels[i], levels[static_cast<std::size_t>(operand)] + 1);
+            follow(static_cast<std::size_t>(operand));
         }
-        Batch& batch = kinds[{levels[i], op.op, std::bit_cast<std::uint64_t>(op.exponent),
+        Batch& batch = kinds[{levels[i], op.op, std::bit_cast<std::uint64_t>(op.exponent), 0,
                               degree(op.a), degree(op.b), degree(op.c), tape_.degree[i]}];
         batch.op = op.op;
         batch.exponent = op.exponent;
@@ -142,7 +166,7 @@ void LazyTape::arrange()
 {
     places_.assign(tape_.ops_count, 0);
     for (std::size_t i = 0; i <= tape_.states; ++i) places_[i] = i;
-    width_ = even(tape_.states + 1);
+    width_ = whole(tape_.states + 1);
     std::vector<Batch> operations = batches();
     for (Batch& batch : operations) place(batch);
     for (Batch& batch : operations) {
@@ -151,6 +175,9 @@ void LazyTape::arrange()
         };
         for (const std::size_t i : batch.ops) {
             batch.lanes.push_back(lane(place_of(tape_.ops[i].a), place_of(tape_.ops[i].b)));
+            for (const Term& term : terms_[i]) {
+                batch.terms.push_back({places_[term.of], term.factor});
+            }
         }
         if (!is_linear(batch.op)) side_by_side(batch);
         if (is_inverse(batch.op)) batch.slope = slopes_of(batch.first, batch.ops.size(), true);
@@ -159,7 +186,7 @@ void LazyTape::arrange()
     for (const int output : tape_.outputs) {
         outputs_.push_back(places_[static_cast<std::size_t>(output)]);
     }
-    rows_.assign((most_taylor_order + 1) * width_, 0);
+    rows_.assign((most_taylor_order + 1) * width_ + 4, 0);
     for (int last = 0; last <= most_taylor_order; ++last) {
         for (int i = 0; i <= last; ++i) {
             outward_[static_cast<std::size_t>(last)][static_cast<std::size_t>(i)] =
@@ -169,7 +196,7 @@ void LazyTape::arrange()
     inverses_.assign(width_, 0);
     factors_.assign(width_, 0);
     for (std::size_t i = 0; i < tape_.ops_count; ++i) factors_[places_[i]] = constants_[i];
-    sums_.assign(width_, 0);
+    sums_.assign(width_ + 4, 0);
     other_sums_ = sums_;
 }
 
@@ -181,12 +208,14 @@ void LazyTape::place(Batch& batch)
             const auto at = static_cast<std::size_t>(operand);
             return operand < 0 || at >= i ? 0 : places_[at];
         };
+        if (!terms_[i].empty())
+            return std::pair(places_[terms_[i][0].of], places_[terms_[i][1].of]);
         return std::pair(place_of(tape_.ops[i].a), place_of(tape_.ops[i].b));
     };
     std::ranges::stable_sort(batch.ops, {}, operands);
     batch.first = width_;
     for (const std::size_t i : batch.ops) places_[i] = width_++;
-    width_ = even(width_);
+    width_ = whole(width_);
 }
 
 /// Lets the operands of a batch stand side by side.
@@ -223,7 +252,7 @@ std::size_t LazyTape::in_a_row(const std::vector<std::size_t>& places, bool late
     if (stand_so) return places.front();
     Batch copies{.pass = Pass::copy, .degree = no_degree, .for_guards = true, .first = width_};
     for (const std::size_t place : places) copies.lanes.push_back(lane(place, 0));
-    width_ += even(places.size());
+    width_ += whole(places.size());
     (late ? late_ : batches_).push_back(copies);
     return copies.first;
 }
@@ -233,7 +262,7 @@ std::size_t LazyTape::slopes_of(std::size_t first, std::size_t count, bool late)
 {
     Batch slopes{.pass = Pass::slope, .degree = no_degree, .for_guards = true, .first = width_};
     for (std::size_t l = 0; l < count; ++l) slopes.lanes.push_back(lane(first + l, 0));
-    width_ += even(count);
+    width_ += whole(count);
     (late ? late_ : batches_).push_back(slopes);
     return slopes.first;
 }
@@ -369,6 +398,35 @@ void LazyTape::add_up_inverse(const Batch& batch, int k)
     }
 }
 
+/// Sums of as many terms in every lane.
+[[gnu::always_inline]] inline void LazyTape::combine(const Batch& batch, int k)
+{
+    const double* const from = row(k);
+    const std::size_t count = batch.lanes.size();
+    double* __restrict const out = row(k) + batch.first;
+    const auto by = [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline))
+    {
+        const Term* term = batch.terms.data();
+        for (std::size_t l = 0; l < count; ++l, term += sizeof...(I)) {
+            out[l] = (... + (term[I].factor * from[term[I].of]));
+        }
+    };
+    switch (const std::size_t terms = batch.terms.size() / count) {
+        case 2: return by(std::make_index_sequence<2>{});
+        case 3: return by(std::make_index_sequence<3>{});
+        case 4: return by(std::make_index_sequence<4>{});
+        case 5: return by(std::make_index_sequence<5>{});
+        case 6: return by(std::make_index_sequence<6>{});
+        default:
+            for (std::size_t l = 0; l < count; ++l) {
+                const Term* const first = batch.terms.data() + l * terms;
+                double sum = first->factor * from[first->of];
+                for (std::size_t i = 1; i < terms; ++i) sum += first[i].factor * from[first[i].of];
+                out[l] = sum;
+            }
+    }
+}
+
 [[gnu::always_inline]] inline void LazyTape::compute_batch(const Batch& batch, int k)
 {
     const double* const from = row(k);
@@ -379,6 +437,7 @@ void LazyTape::add_up_inverse(const Batch& batch, int k)
     const auto b = [=](std::size_t l) { return from[lanes[l].b]; };
     if (batch.pass == Pass::slope) return put([=](std::size_t l) { return k * a(l); });
     if (batch.pass == Pass::copy) return put(a);
+    if (batch.pass == Pass::combination) return combine(batch, k);
     switch (batch.op) {
         case TaylorOp::input:
         case TaylorOp::constant: return;
@@ -450,8 +509,10 @@ void LazyTape::advance(int k, double* out, double* guards)
 {
     const std::size_t n = tape_.states;
     const double* const from = row(k);
-    double* const to = row(k + 1);
-    for (std::size_t i = 0; i < n; ++i) to[i] = from[outputs_[i]];
+    double* __restrict const to = row(k + 1);
+    const std::size_t* const places = outputs_.data();
+#pragma GCC unroll 4
+    for (std::size_t i = 0; i < n; ++i) to[i] = from[places[i]];
     for (std::size_t i = 0; i < n; ++i) to[i] /= k + 1;
     std::copy_n(to, n, out + static_cast<std::size_t>(k + 1) * n);
     keep_guards(k, guards);

@@ -199,6 +199,34 @@ TEST(TaylorSeries, RecordedOperationsHaveTheSameBitsSideBySide)
     expect_bits_in_any_number<Angles>();
 }
 
+/// Sums of sums, of multiples and of opposites, some of which are used twice.
+struct Combined {
+    template <class S>
+    constexpr void flow(const S& t, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
+    {
+        const S product = x[0] * x[1];
+        const S shared = 0.3 * product;
+        const S sum = x[0] + shared;
+        const S above = x[1] + (product - 0.1 * x[0]);
+        dxdt[0] = 0.0;
+        dxdt[0] -= 2.5 * product;
+        dxdt[0] += shared;
+        dxdt[0] += -(0.7 * x[1]) + sum / 3.0;
+        dxdt[1] = above - (x[0] * x[0] + x[1]) - (-x[1]);
+        dxdt[1] += sum - 0.2 * (x[0] - x[1]) + (1.0 - shared) + 1.1 * t - 0.4 * product - t;
+    }
+};
+
+TEST(TaylorSeries, RecordedSumsHaveTheBitsOfTheirOperationsOneByOne)
+{
+    const Two x{0.4, -1.3};
+    const auto one_by_one = series_of<true>(Combined{}, 0.3, x);
+    const auto recorded = lazy_series_of(Combined{}, 0.3, x);
+    for (std::size_t k = 0; k <= order; ++k) EXPECT_EQ(recorded[k], one_by_one[k]) << k;
+    expect_bits_in_any_number<Combined>();
+    expect_reference_series(Combined{}, 0.3, x);
+}
+
 struct Oscillator {
     double stiffness = 1;
     template <class S>

@@ -55,12 +55,18 @@ private:
     /// What is computed side by side: coefficient k of operations of one kind.
     enum class Pass {
         operation,
-        copy,   ///< of operands that do not stand side by side
-        slope,  ///< k times a coefficient
+        combination,  ///< a sum of more than two operands, with factors
+        copy,         ///< of operands that do not stand side by side
+        slope,        ///< k times a coefficient
     };
     /// Places of the operands.
     struct Lane {
         std::uint32_t a, b;
+    };
+    /// A term of a combination: an operation, or its place, and its factor.
+    struct Term {
+        std::size_t of;
+        double factor;
     };
     struct Batch {
         Pass pass = Pass::operation;
@@ -72,6 +78,7 @@ private:
         std::size_t first = 0;           ///< place of the first lane
         std::vector<std::size_t> ops{};  ///< their numbers on the tape
         std::vector<Lane> lanes{};
+        std::vector<Term> terms{};  ///< of combinations, lane by lane
         /// Places of the first operands where those of all lanes stand side by side, and of the
         /// slopes of the operands and of the results.
         std::size_t a = 0, b = 0, c = 0, slope_a = 0, slope_b = 0, slope = 0;
@@ -85,6 +92,8 @@ private:
     [[nodiscard]] int repeated(TapeOp& op, double& constant) const;
     void add_partners();
 
+    void combine_sums();
+    [[nodiscard]] Term term(int i, const std::vector<int>& uses);
     void arrange();
     [[nodiscard]] static Lane lane(std::size_t a, std::size_t b) noexcept;
     [[nodiscard]] std::vector<Batch> batches() const;
@@ -97,6 +106,7 @@ private:
     [[nodiscard]] double begin(std::size_t i);
     void compute_row(int k, bool guards_alone);
     void compute_batch(const Batch& batch, int k);
+    void combine(const Batch& batch, int k);
     void add_up(const Batch& batch, int k);
     void add_up_function(const Batch& batch, int k);
     void add_up_inverse(const Batch& batch, int k);
@@ -121,6 +131,9 @@ private:
 
     Tape tape_;
     std::vector<double> constants_;
+    /// Of every sum, from which its operations follow if it is a combination.
+    std::vector<std::vector<Term>> terms_;
+    std::vector<bool> absorbed_;        ///< operations that are parts of combinations
     std::vector<std::size_t> places_;   ///< of operations in a row
     std::vector<std::size_t> outputs_;  ///< places of the outputs
     std::vector<Batch> batches_;        ///< in their order
