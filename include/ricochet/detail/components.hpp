@@ -80,7 +80,11 @@ void move_many(double* to, const double* from, double factor, const double* dire
 
 /// A state of doubles side by side, whose number is not small. (Eigen's may be rows of a matrix.)
 template <class X>
-concept LongArray = !is_small<X> && !requires { X::SizeAtCompileTime; } && requires(X& x)
+concept LongArray = !is_small<X> && !requires
+{
+    X::SizeAtCompileTime;
+}
+&&requires(X& x)
 {
     {
         x.data()
