@@ -255,7 +255,7 @@ public:
         GuardRecord& record = records_[i];
         const double g = g0_[i];
         const bool as_before = !record.fired && !record.newly_enabled && side_of(g) == record.side;
-        const bool clear = std::fabs(g) > record.band && is_finite(g);
+        const bool clear = std::fabs(g) > record.band && std::isfinite(g);
         const bool kept_out = record.info.unilateral && record.side == Side::below;
         if (!(as_before && clear) || kept_out || record.deferred) return false;
         record.estimated = false;
