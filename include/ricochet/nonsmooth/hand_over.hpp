@@ -24,12 +24,6 @@
 #include "ricochet/detail/refused_calls.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
-// Defined by the library's target.
-#ifndef RICOCHET_WITH_NONSMOOTH
-#error \
-    "ricochet: nonsmooth/hand_over.hpp needs ricochet::nonsmooth, or RICOCHET_WITH_NONSMOOTH defined"
-#endif
-
 namespace ricochet {
 
 /// `Stepping` of the event-driven phases: `ErrorControlled<Method>`, or `FixedStep<Method>` with
@@ -447,6 +441,19 @@ private:
     MixedRun<X> run_;
 };
 
+namespace detail {
+
+/// Whether the library of inclusions is linked: its target defines RICOCHET_WITH_NONSMOOTH.
+template <class>
+inline constexpr bool nonsmooth_is_linked =
+#ifdef RICOCHET_WITH_NONSMOOTH
+    true;
+#else
+    false;
+#endif
+
+}  // namespace detail
+
 /// Integrates by events as far as possible, and by the inclusion where events cannot continue.
 ///
 /// @throws std::invalid_argument as for other systems; also for `stop_at_event`, `record_steps`, a
@@ -458,6 +465,9 @@ requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
                                     const Stepping& stepping = {}, const Detector& detector = {},
                                     const Locator& locator = {})
 {
+    static_assert(detail::nonsmooth_is_linked<System>,
+                  "ricochet: found a system with set_valued(), and a target that does not link "
+                  "ricochet::nonsmooth; expected it to, or RICOCHET_WITH_NONSMOOTH to be defined");
     return EventHandOver<System, X, Stepping, Detector, Locator>(system, x0, options, stepping,
                                                                  detector, locator)
         .take();
