@@ -172,6 +172,18 @@ public:
         return {dense(), s};
     }
 
+    /// The state `x` moved by s along `rate`, one component at a time.
+    [[nodiscard]] PolynomialView<X, false> line(const X& x, const X& rate, double s) const noexcept
+        requires(!is_small<X>)
+    {
+        return {DenseParts<X>{.nodes = DenseNodes::series,
+                              .h = 1,
+                              .x0 = &x,
+                              .remainder = &state_.zero,
+                              .rate0 = &rate},
+                s};
+    }
+
     /// The step as a polynomial of the order that the method attains over many steps.
     /// Its inner nodes are computed on first use.
     [[nodiscard]] DenseParts<X> dense() const

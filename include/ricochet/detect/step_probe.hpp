@@ -380,6 +380,13 @@ private:
     [[nodiscard]] double value_along_the_flow(double from, double s) override
     {
         if (path_ == Path::dense) return value_at(s);
+        if constexpr (may_see && requires { step_->line(space_->x, space_->dxdt, s); }) {
+            // Of a large state only the components that the guard reads are moved.
+            if (sees() && space_->x.size() > 64) {
+                return guard_->value(step_->time(s),
+                                     step_->line(space_->x, space_->dxdt, s - from));
+            }
+        }
         detail::move(space_->root, space_->x, s - from, space_->dxdt);
         return guard_->value(step_->time(s), space_->root);
     }
