@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -288,6 +289,53 @@ TEST(EventHandOver, TimeEventsHappenUnderTheInclusion)
     const double from = run.trajectory.x[1][0] + 1;
     EXPECT_NEAR(run.trajectory.x[2][0], -1 + from * std::cos(1) + 3 * std::sin(1), 1e-8);
     EXPECT_NEAR(run.trajectory.x[2][1], 3 * std::cos(1) - from * std::sin(1), 1e-8);
+}
+
+/// A mass that a load pulls beyond its friction every few seconds, kicked every `interval`.
+struct Kicked {
+    using State = std::array<double, 2>;
+    struct Friction {
+        static constexpr int state_size = 2;
+        static constexpr int reaction_size = 1;
+        static void smooth(double t, const Eigen::Vector2d& w, Eigen::Vector2d& f)
+        {
+            f << w[1], 1.2 * std::sin(t);
+        }
+        static void observe(Eigen::Matrix<double, 1, 2>& e) { e << 0, 1; }
+        [[nodiscard]] static sets::Box<1> reaction_set(double, const Eigen::Vector2d&)
+        {
+            return sets::Box<1>({-1}, {1});
+        }
+    };
+    static constexpr Crossing crossing = Crossing::either;
+    double interval;
+
+    static void flow(double t, const State& x, State& dxdt)
+    {
+        dxdt = {x[1], 1.2 * std::sin(t) - (x[1] >= 0 ? 1 : -1)};
+    }
+    [[nodiscard]] static double guard(double, const State& x) { return x[1]; }
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        int k = 1;
+        while (interval * k <= t) ++k;
+        return interval * k;
+    }
+    static void time_reset(double, State& x) { x[1] += 0.01; }
+    [[nodiscard]] static Friction set_valued() { return {}; }
+};
+
+TEST(EventHandOver, ATimeEventAtWhichTheInclusionEndsIsNotLost)
+{
+    for (int i = 0; i < 40; ++i) {
+        const Kicked kicked{0.5003 + 0.01 * i};
+        const auto run =
+            integrate(kicked, Kicked::State{0, 0.1}, {.t_end = 10, .rtol = 1e-8, .atol = 1e-10});
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
+        const auto times = std::count_if(run.events.begin(), run.events.end(),
+                                         [](const auto& e) { return e.kind == EventKind::time; });
+        EXPECT_EQ(times, std::floor(10 / kicked.interval)) << kicked.interval;
+    }
 }
 
 /// The same with a guard that is narrow, so that steps are divided for it.

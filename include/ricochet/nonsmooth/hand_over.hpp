@@ -343,7 +343,10 @@ private:
         run_.x = detail::converted_state(done.state.w, run_.x);
         run_.failure = done.failure;
         run_.outcome = done.outcome;
-        return stops && done.outcome == Outcome::reached_end;
+        // The last step may also release every reaction.
+        const bool goes_on =
+            done.outcome == Outcome::reached_end || done.outcome == Outcome::released;
+        return stops && goes_on && run_.t == due;
     }
 
     // --- time events while the inclusion is followed ---
