@@ -338,6 +338,22 @@ TEST(EventHandOver, ATimeEventAtWhichTheInclusionEndsIsNotLost)
     }
 }
 
+TEST(EventHandOver, EventsThatAreNotRecordedAreStillReviewed)
+{
+    const Kicked kicked{0.7};
+    const Options options{.t_end = 10, .rtol = 1e-8, .atol = 1e-10, .max_steps = 20'000};
+    Options quiet = options;
+    quiet.record_events = false;
+    const auto recorded = integrate(kicked, Kicked::State{0, 0.1}, options);
+    const auto run = integrate(kicked, Kicked::State{0, 0.1}, quiet);
+    EXPECT_EQ(run.outcome, recorded.outcome);
+    EXPECT_EQ(run.x, recorded.x);
+    EXPECT_EQ(run.phases.size(), recorded.phases.size());
+    EXPECT_EQ(run.statistics.event_driven.events, recorded.statistics.event_driven.events);
+    EXPECT_TRUE(run.events.empty());
+    EXPECT_TRUE(integrate(SlidingMode{}, Relay::State::Constant(0.15), quiet).events.empty());
+}
+
 /// The same with a guard that is narrow, so that steps are divided for it.
 struct Divided : Thrown {
     static constexpr std::size_t guard_count = 2;

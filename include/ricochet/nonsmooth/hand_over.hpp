@@ -256,6 +256,7 @@ private:
         options.mode = run_.mode;
         options.sample_times = remaining_samples();
         options.max_steps = options_.max_steps - steps_taken();
+        options.record_events = true;  // the watches below review them
         using Loop = Simulation<System, X, Stepping, Detector, Locator>;
         std::optional<Loop> simulation;
         try {
@@ -276,7 +277,9 @@ private:
         run_.t = done.t;
         run_.x = done.x;
         run_.mode = done.mode;
-        std::move(done.events.begin(), done.events.end(), std::back_inserter(run_.events));
+        if (options_.record_events) {
+            std::move(done.events.begin(), done.events.end(), std::back_inserter(run_.events));
+        }
         append(done.trajectory);
         detail::add(run_.statistics.event_driven, done.statistics);
         if (chatters) return PhaseCause::chattering;
@@ -331,7 +334,9 @@ private:
         w = detail::converted_state(run_.x, w);
         HandOver<Set> inclusion(set_, w, options);
         HandOverRun<Set> done = inclusion.take();
-        for (const auto& event : done.events) run_.events.push_back(converted(event));
+        if (options_.record_events) {
+            for (const auto& event : done.events) run_.events.push_back(converted(event));
+        }
         for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
             run_.trajectory.t.push_back(done.trajectory.t[i]);
             run_.trajectory.x.push_back(detail::converted_state(done.trajectory.x[i], run_.x));
@@ -482,7 +487,9 @@ requires NotIntegrable<System, X> && Inclusion<System>
 [[nodiscard]] HandOverRun<System> integrate(const System& system, const X& w0,
                                             const Options& options, const Stepping& stepping = {})
 {
-    return hand_over(system, StateOf<System>(w0), hand_over_options(options), stepping);
+    auto run = hand_over(system, StateOf<System>(w0), hand_over_options(options), stepping);
+    if (!options.record_events) run.events.clear();
+    return run;
 }
 
 }  // namespace ricochet
