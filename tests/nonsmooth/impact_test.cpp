@@ -323,5 +323,18 @@ TEST(TimeStepping, RefusesAStartInsideAnObstacleAndWrongCoefficients)
                  std::invalid_argument);
 }
 
+TEST(TimeStepping, RefusesARestartThatIsNotFinite)
+{
+    TimeStepping<Ball1d> steps({}, Ball1d::V(1.0), Ball1d::V(0.0), {.t_end = 1, .step = 0.1});
+    const double nan = std::nan("");
+    const auto refused = [&](double t, double q, double v) {
+        return refusal([&] { steps.restart(t, Ball1d::V(q), Ball1d::V(v)); });
+    };
+    EXPECT_EQ(refused(nan, 1, 0), "inclusion: the time at the start must be finite, not nan");
+    EXPECT_EQ(refused(0, nan, 0), "inclusion: the initial position is not finite");
+    EXPECT_EQ(refused(0, 1, nan), "inclusion: the initial velocity is not finite");
+    EXPECT_EQ(refused(0, 1, 0), "accepted");
+}
+
 }  // namespace
 }  // namespace ricochet::impact_test

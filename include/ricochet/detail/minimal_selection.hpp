@@ -3,6 +3,7 @@
 // The reaction that the motion selects among those allowed at a state.
 #pragma once
 
+#include <cmath>
 #include <limits>
 #include <string>
 #include <type_traits>
@@ -12,6 +13,37 @@
 namespace ricochet {
 
 namespace detail {
+
+/// @throws std::invalid_argument for a time or state that is not finite, and for another size.
+template <int N, int M>
+void check_start(const AnyMatrices<N, M>& m, double t, const typename AnyMatrices<N, M>::State& w)
+{
+    if (!std::isfinite(t)) refuse_inclusion("the time at the start must be finite, not", t);
+    if (w.size() != m.size()) {
+        refuse_inclusion("the initial state must have as many components as the system, not",
+                         static_cast<double>(w.size()));
+    }
+    if (!w.allFinite()) refuse_inclusion("the initial state is not finite");
+}
+
+/// @throws std::invalid_argument for a reaction outside its set.
+template <int N, int M>
+void check_reaction(const AnyMatrices<N, M>& m, const StateWithReaction<N, M>& start)
+{
+    if (start.reaction.size() != m.reactions()) {
+        refuse_inclusion("the start must have as many reactions as the system, not",
+                         static_cast<double>(start.reaction.size()));
+    }
+    if (!start.reaction.allFinite()) refuse_inclusion("the reaction at the start is not finite");
+    if (!m.traits().of_reactions()) return;
+    typename AnyMatrices<N, M>::Reaction nearest = start.reaction;
+    m.inclusion().project(start.t, start.w, start.reaction, nearest);
+    const double off = (nearest - start.reaction).template lpNorm<Eigen::Infinity>();
+    // The reaction of an earlier step lies in the set only to the solver's tolerance.
+    if (!(off <= 1e-9 * (1 + nearest.template lpNorm<Eigen::Infinity>()))) {
+        refuse_inclusion("the reaction at the start is outside its set by", off);
+    }
+}
 
 /// reaction = P(reaction - rho (y / delta + q + W reaction)) by Newton's method.
 template <int N, int M>
@@ -63,7 +95,7 @@ struct RICOCHET_ALIGNED SelectionStart {
         : m(matrices), t(time), w(state)
     {
         const auto& inclusion = m.inclusion();
-        if (!w.allFinite()) refuse_inclusion("the initial state is not finite");
+        check_start(m, t, w);
         if (const std::string fault = inclusion.fault(t, w); !fault.empty()) {
             refuse_inclusion("the set at the start " + fault);
         }

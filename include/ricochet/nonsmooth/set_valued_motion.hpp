@@ -113,10 +113,11 @@ public:
 
     /// Restarts from (t, w): after a jump, or when an event-driven
     /// integrator hands over.
+    /// @throws std::invalid_argument for a time or state that is not finite, and for another size.
     void restart(double t, const Vector& w);
 
     /// Restarts from a state with a known reaction.
-    /// @throws std::invalid_argument if the reaction lies outside the set.
+    /// @throws std::invalid_argument also if the reaction lies outside the set.
     void restart(const State& state);
 
     [[nodiscard]] const State& state() const noexcept { return now_; }
@@ -201,18 +202,6 @@ private:
         holds_length_ = std::holds_alternative<ConstantStep>(options_.controller);
         if (traits().box) step_.branches_of(now_, start_branches_);
         outcome_ = now_.t < options_.t_end ? Outcome::running : Outcome::reached_end;
-    }
-
-    void check_reaction(const State& state) const
-    {
-        if (!traits().of_reactions()) return;
-        Reaction nearest = state.reaction;
-        inclusion().project(state.t, state.w, state.reaction, nearest);
-        const double off = (nearest - state.reaction).template lpNorm<Eigen::Infinity>();
-        // The reaction of an earlier step lies in the set only to the solver's tolerance.
-        if (!(off <= 1e-9 * (1 + nearest.template lpNorm<Eigen::Infinity>()))) {
-            refuse_inclusion("the reaction at the start is outside its set by", off);
-        }
     }
 
     Outcome end_with(Outcome outcome) { return outcome_ = outcome; }
@@ -511,7 +500,8 @@ void AnyMotion<N, M>::restart(double t, const Vector& w)
 template <int N, int M>
 void AnyMotion<N, M>::restart(const State& state)
 {
-    check_reaction(state);
+    check_start(step_.matrices(), state.t, state.w);
+    check_reaction(step_.matrices(), state);
     now_ = state;
     begin();
 }

@@ -95,6 +95,7 @@ public:
                     const TimeSteppingOptions& options);
 
     /// Restarts from (t, q, v), when an integrator of free flight hands over.
+    /// @throws std::invalid_argument for a time, position or velocity that is not finite.
     void restart(double t, const Vector& q, const Vector& v);
 
     [[nodiscard]] const State& state() const noexcept { return state_; }
@@ -121,6 +122,13 @@ public:
     }
 
 private:
+    static void check_start(double t, const Vector& q, const Vector& v)
+    {
+        if (!std::isfinite(t)) refuse_inclusion("the time at the start must be finite, not", t);
+        if (!q.allFinite()) refuse_inclusion("the initial position is not finite");
+        if (!v.allFinite()) refuse_inclusion("the initial velocity is not finite");
+    }
+
     bool take(double h)
     {
         middle_ = state_.q + (h / 2) * state_.v;
@@ -218,8 +226,7 @@ AnyTimeStepping<N>::AnyTimeStepping(const AnyMechanism<N>& system, const Vector&
     : system_(system), options_(options), solver_(options.contacts)
 {
     validate(options);
-    if (!q.allFinite()) refuse_inclusion("the initial position is not finite");
-    if (!v.allFinite()) refuse_inclusion("the initial velocity is not finite");
+    check_start(options.t_start, q, v);
     system_->gaps(q, gaps_);
     for (int c = 0; c < system_->contacts; ++c) {
         check_contact(c, system_->restitution(c), system_->friction(c), gaps_[c],
@@ -242,6 +249,7 @@ AnyTimeStepping<N>::AnyTimeStepping(const AnyMechanism<N>& system, const Vector&
 template <int N>
 void AnyTimeStepping<N>::restart(double t, const Vector& q, const Vector& v)
 {
+    check_start(t, q, v);
     impulse_.setZero(system_->contacts * system_->components);
     state_ = {t, q, v, impulse_};
     outcome_ = t < options_.t_end ? Outcome::running : Outcome::reached_end;

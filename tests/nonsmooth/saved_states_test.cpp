@@ -1,0 +1,74 @@
+// States of earlier runs, given back to a motion: what they continue, and what is refused.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "refusal.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
+
+namespace ricochet::saved_states_test {
+namespace {
+
+using One = Eigen::Matrix<double, 1, 1>;
+
+/// w' = load + r, |r| <= 1.
+struct Relay {
+    static constexpr int state_size = 1;
+    static constexpr int reaction_size = 1;
+    double load = 0.3;
+    void smooth(double, const One&, One& f) const { f[0] = load; }
+    static sets::IntervalSet reaction_set(double, const One&) { return {-1, 1}; }
+};
+
+TEST(SavedStates, WhatIsNoStateIsRefused)
+{
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    SetValuedMotion<Relay> motion(Relay{}, One::Constant(1), {.t_end = 1, .step = 0.1});
+    const auto good = motion.state();
+    const auto refused = [&](double t, double w, double reaction) {
+        return refusal([&] { motion.restart({t, One::Constant(w), One::Constant(reaction)}); });
+    };
+    EXPECT_EQ(refused(nan, 1, -1), "inclusion: the time at the start must be finite, not nan");
+    EXPECT_EQ(refused(0, nan, -1), "inclusion: the initial state is not finite");
+    EXPECT_EQ(refused(0, 1, nan), "inclusion: the reaction at the start is not finite");
+    EXPECT_THROW(motion.restart(nan, One::Constant(1)), std::invalid_argument);
+    EXPECT_EQ(motion.state().t, good.t);
+    EXPECT_EQ(motion.run(), Outcome::reached_end);
+}
+
+/// w' = r, sized at run time.
+struct Sized {
+    static constexpr int state_size = Eigen::Dynamic;
+    static constexpr int reaction_size = Eigen::Dynamic;
+    static int size() { return 2; }
+    static int reactions() { return 2; }
+    static void smooth(double, const Eigen::VectorXd&, Eigen::VectorXd& f) { f.setZero(); }
+    static sets::Box<2> reaction_set(double, const Eigen::VectorXd&)
+    {
+        return sets::Box<2>({-1, -1}, {1, 1});
+    }
+};
+
+TEST(SavedStates, AnotherSizeIsRefused)
+{
+    const Eigen::VectorXd start = Eigen::Vector2d(1, 1);
+    const SetValuedOptions options{.t_end = 1, .step = 0.1};
+    SetValuedMotion<Sized> motion(Sized{}, start, options);
+    const auto refused = [&](int components, int reactions) {
+        return refusal([&] {
+            motion.restart(
+                {0, Eigen::VectorXd::Ones(components), -Eigen::VectorXd::Ones(reactions)});
+        });
+    };
+    EXPECT_EQ(refused(2, 2), "accepted");
+    EXPECT_EQ(refused(1, 2),
+              "inclusion: the initial state must have as many components as the system, not 1");
+    EXPECT_EQ(refused(2, 3),
+              "inclusion: the start must have as many reactions as the system, not 3");
+    EXPECT_THROW(motion.restart(0, Eigen::VectorXd::Ones(3)), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace ricochet::saved_states_test
