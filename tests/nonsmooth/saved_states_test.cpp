@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "problems/super_twisting.hpp"
 #include "refusal.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 
@@ -21,6 +22,32 @@ struct Relay {
     void smooth(double, const One&, One& f) const { f[0] = load; }
     static sets::IntervalSet reaction_set(double, const One&) { return {-1, 1}; }
 };
+
+TEST(SavedStates, ASetValuedPhaseBeginsWhereTheEventsBeforeItEnd)
+{
+    const SuperTwisting system;
+    const auto whole = hand_over(system, Eigen::Vector2d(1, 0), {.t_end = 10});
+    ASSERT_EQ(whole.phases.size(), 2U);
+    const double middle = whole.phases[1].from / 2;
+    const auto first = hand_over(system, Eigen::Vector2d(1, 0), {.t_end = middle});
+    const auto rest = HandOver<SuperTwisting>(system, first.state, {.t_end = 10}).take();
+
+    ASSERT_EQ(rest.outcome, Outcome::reached_end);
+    ASSERT_EQ(rest.phases.size(), 2U);
+    EXPECT_NEAR(rest.phases[1].from, whole.phases[1].from, 1e-4);
+    EXPECT_NEAR(rest.statistics.set_valued_time, 10 - rest.phases[1].from, 1e-9);
+    EXPECT_LE(rest.events.size(), whole.events.size());
+}
+
+TEST(SavedStates, WhatAReactionHoldsUpToTheErrorOfStepsIsHeldFromTheStart)
+{
+    const HandOver<Relay>::State start{
+        .t = 0, .w = One::Constant(1e-15), .reaction = One::Constant(-0.3)};
+    const auto run = HandOver<Relay>(Relay{}, start, {.t_end = 1}).take();
+    EXPECT_TRUE(run.events.empty());
+    EXPECT_EQ(run.state.w[0], 0);
+    EXPECT_NEAR(run.state.reaction[0], -0.3, 1e-15);
+}
 
 TEST(SavedStates, WhatIsNoStateIsRefused)
 {

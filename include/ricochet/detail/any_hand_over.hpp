@@ -24,13 +24,6 @@ namespace ricochet::detail {
 void add(Statistics& sum, const Statistics& more) noexcept;
 void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
 
-/// Stands for the modes of an inclusion without branches.
-struct NoModes {
-    template <class Inclusion>
-    explicit NoModes(const Inclusion& /*inclusion*/)
-    {
-    }
-};
 struct NoneHeld {};
 
 /// `HandOver` for systems of any type.
@@ -71,7 +64,10 @@ private:
     {
         if constexpr (can_branch) {
             if (branching_) {
-                const Mode mode = modes_.mode_at(run_.state.t, run_.state.w);
+                State& start = run_.state;
+                const Mode mode = keeps_reaction_
+                                      ? modes_.mode_after(start, 10 * resolution(start.w))
+                                      : modes_.mode_at(start.t, start.w);
                 if (mode < Modes::branch_modes) return go_by_events(mode, PhaseCause::start);
                 return go_by_steps(cause_of(mode));
             }
@@ -101,6 +97,7 @@ private:
     {
         run_.mode = mode;
         set_valued_ = false;
+        keeps_reaction_ = false;  // it is that of the start, which the events leave
         if (cause == PhaseCause::released) ++run_.statistics.to_events;
         run_.phases.push_back({.from = run_.state.t, .set_valued = false, .cause = cause});
     }

@@ -184,6 +184,10 @@ public:
     /// @throws std::invalid_argument for what `minimal_selection` refuses.
     [[nodiscard]] Mode mode_at(double t, Vector& w) const;
 
+    /// The same at the end of an earlier run, whose steps have held a y only up to their error: a y
+    /// of at most `error` whose reaction is inside its bounds counts as zero, too.
+    [[nodiscard]] Mode mode_after(StateWithReaction<N, M>& end, double error) const;
+
     /// The branches that follow from the signs of y; inside where y is zero up to rounding.
     [[nodiscard]] Branches zero_branches(double t, const Vector& w) const;
 
@@ -476,6 +480,23 @@ Mode AnyModes<N, M>::mode_at(double t, Vector& w) const
 }
 
 template <int N, int M>
+Mode AnyModes<N, M>::mode_after(StateWithReaction<N, M>& end, double error) const
+{
+    (void)minimal_selection(matrices_, end.t, end.w);
+    LinearInequality<M> inequality;
+    matrices_.inclusion().bounds(end.t, end.w, inequality.lower, inequality.upper);
+    const Reaction y = observed(end.t, end.w);
+    Branches held = zero_branches(end.t, end.w);
+    for (Eigen::Index i = 0; i < M; ++i) {
+        const double r = end.reaction[i];
+        const bool inside = r > inequality.lower[i] && r < inequality.upper[i];
+        if (inside && std::abs(y[i]) <= error) held[i] = Branch::inside;
+    }
+    hold(held, end.t, end.w);
+    return settle(held, end.t, end.w);
+}
+
+template <int N, int M>
 auto AnyModes<N, M>::zero_branches(double t, const Vector& w) const -> Branches
 {
     const Reaction y = observed(t, w);
@@ -505,6 +526,14 @@ void AnyModes<N, M>::hold(const Branches& branches, double t, Vector& w) const
         if (branches[i] == Branch::inside) matrices_.hold(i, 0, s[i], w);
     }
 }
+
+/// Stands for the modes of an inclusion without branches.
+struct NoModes {
+    template <class Inclusion>
+    explicit NoModes(const Inclusion& /*inclusion*/)
+    {
+    }
+};
 
 }  // namespace detail
 
