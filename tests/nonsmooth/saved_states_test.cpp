@@ -97,5 +97,35 @@ TEST(SavedStates, AnotherSizeIsRefused)
     EXPECT_THROW(motion.restart(0, Eigen::VectorXd::Ones(3)), std::invalid_argument);
 }
 
+/// Friction on the first component.
+struct Loaded {
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 1;
+    static void smooth(double t, const Eigen::Vector2d& w, Eigen::Vector2d& f)
+    {
+        const double load = std::sin(6.5587836136678508 * t + 5.1130662026723801);
+        f[0] = -1.9307551525372673 * w[0] - 0.60916231752842842 * w[1] + 2.3647981706406727 * load +
+               0.65323076161880711;
+        f[1] = 1.1752732706299525 * w[0] + 1.4992100967283024 * w[1] + 1.4410244029845805 * load;
+    }
+    static sets::IntervalSet reaction_set(double, const Eigen::Vector2d&)
+    {
+        return sets::IntervalSet::symmetric(0.91598101144046828);
+    }
+};
+
+TEST(SavedStates, ARunThatEndsAtAnEventRecordsNoChangesThatAreNone)
+{
+    const Eigen::Vector2d start(0.35715470556968443, -0.36869651681179905);
+    const auto whole = hand_over(Loaded{}, start, {.t_end = 2});
+    ASSERT_EQ(whole.events.size(), 3U);
+    for (const auto& change : whole.events) {
+        const auto run = hand_over(Loaded{}, start, {.t_end = change.t});
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        EXPECT_LE(run.events.size(), 3U);
+        for (const auto& event : run.events) EXPECT_NE(event.mode_before, event.mode_after);
+    }
+}
+
 }  // namespace
 }  // namespace ricochet::saved_states_test

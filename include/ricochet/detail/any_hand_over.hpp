@@ -312,10 +312,9 @@ private:
         for (const Event<X>& event : done.events) {
             // Where a load hardly passes the bound, rounding leaves y on zero and its guard fires
             // again and again, while the reaction stays at its bound.
-            const bool stays =
-                event.mode_after == event.mode_before && same_state(event.after, event.before);
-            idle += stays;
-            if (!stays && event.mode_after != Modes::empty) {
+            if (event.mode_after == event.mode_before) {
+                ++idle;
+            } else if (event.mode_after != Modes::empty) {
                 run_.events.push_back(converted(event));
             }
         }
