@@ -256,6 +256,19 @@ TEST(ContactMotion, ARunOfNoLengthIsOver)
     }
 }
 
+TEST(ContactMotion, NoLimitOfStepsIsPassedWhereContactBegins)
+{
+    const auto with = [](std::uint64_t most) {
+        return hand_over(Ball{}, {0, 0.8}, {4, 0}, {.t_end = 3, .max_steps = most});
+    };
+    const std::uint64_t flight = with(1'000'000).statistics.event_driven.steps;
+    for (std::uint64_t most = flight - 1; most <= flight + 2; ++most) {
+        const auto run = with(most);
+        EXPECT_EQ(run.outcome, Outcome::step_limit);
+        EXPECT_EQ(run.statistics.event_driven.steps + run.statistics.time_stepping.steps, most);
+    }
+}
+
 TEST(ContactMotion, RefusesAStartInsideAnObstacle)
 {
     EXPECT_THROW((void)hand_over(Ball{.mu = std::numeric_limits<double>::infinity()}, {0, 1},

@@ -127,5 +127,18 @@ TEST(SavedStates, ARunThatEndsAtAnEventRecordsNoChangesThatAreNone)
     }
 }
 
+TEST(SavedStates, NoLimitOfStepsIsPassedWhereThePhaseChanges)
+{
+    const auto with = [](std::uint64_t most) {
+        return hand_over(SuperTwisting{}, Eigen::Vector2d(1, 0), {.t_end = 10, .max_steps = most});
+    };
+    const std::uint64_t before = with(1'000'000).statistics.event_driven.steps;
+    for (std::uint64_t most = before - 1; most <= before + 2; ++most) {
+        const auto run = with(most);
+        EXPECT_EQ(run.outcome, Outcome::step_limit);
+        EXPECT_EQ(run.statistics.event_driven.steps + run.statistics.set_valued.attempted, most);
+    }
+}
+
 }  // namespace
 }  // namespace ricochet::saved_states_test

@@ -391,6 +391,9 @@ private:
     {
         const double from = motion_.state().t;
         emit_samples(true);
+        if (motion_.outcome() == Outcome::running && steps_taken() >= options_.max_steps) {
+            end_with(Outcome::step_limit);
+        }
         auto branches = motion_.branches();
         for (std::uint64_t steps = 1; !ended_; ++steps) {
             const std::uint64_t switches = motion_.statistics().switches;

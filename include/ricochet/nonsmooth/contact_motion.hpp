@@ -174,6 +174,9 @@ private:
     {
         const double from = run_.t;
         std::uint64_t open = 0;
+        if (steps_.outcome() == Outcome::running && steps_taken() >= options_.max_steps) {
+            end_with(Outcome::step_limit);
+        }
         while (!ended_ && in_contact_) {
             const double t_before = steps_.state().t;
             const X before = Flight::state(steps_.state().q, steps_.state().v);
