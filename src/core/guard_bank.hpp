@@ -257,12 +257,11 @@ public:
         const bool as_before = !record.fired && !record.newly_enabled && side_of(g) == record.side;
         const bool clear = std::fabs(g) > record.band && std::isfinite(g);
         const bool kept_out = record.info.unilateral && record.side == Side::below;
-        if (!(as_before && clear) || kept_out || record.deferred) return false;
+        if (!(as_before && clear) || kept_out) return false;
         record.estimated = false;
         record.departs = false;
         record.from = 0;
-        sign_[i] = sign_of(record.side);
-        as_screened_ = false;
+        arm(i, record.side);
         return true;
     }
 

@@ -1,4 +1,4 @@
-// Guards: scalar functions whose sign change marks an event.
+// Guards, scalar functions whose sign change marks an event, and events.
 //
 // A guard g(t, x) is positive inside a mode and zero on its event surface. Which
 // side it is on is remembered as the side on which it was *armed*, not as its
