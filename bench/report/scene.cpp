@@ -1,4 +1,4 @@
-// ricochet itself: N balls as a scene, each with its own time.
+// ricochet itself: one ball or N balls as a scene, each with its own time.
 #include "ricochet/scene/scene.hpp"
 
 #include "cells.hpp"
@@ -9,12 +9,13 @@ namespace ricochet::report {
 namespace {
 
 /// The balls of a task as points above a floor, side by side.
-[[nodiscard]] Scene scene_of(const Task<Balls>& task)
+template <class System>
+[[nodiscard]] Scene scene_of(const Task<System>& task)
 {
     Scene scene({.gravity = {0, -9.81}});
     const MaterialId rubber = scene.material({.name = "rubber", .restitution = 0.9});
     scene.wall({.point = {0, 0}, .normal = {0, 1}, .material = rubber});
-    for (std::size_t i = 0; i < task.system.balls; ++i) {
+    for (std::size_t i = 0; 2 * i < task.x0.size(); ++i) {
         scene.point({.at = {static_cast<double>(i), task.x0[2 * i]}, .material = rubber});
     }
     return scene;
@@ -38,8 +39,8 @@ namespace {
 void add_scene(Cells& cells)
 {
     for_each_problem([&](const std::string& name, const std::string& /*title*/, const auto& make) {
-        using Task = typename std::decay_t<decltype(make())>::value_type;
-        if constexpr (std::is_same_v<decltype(Task::system), Balls>) {
+        using System = decltype(std::decay_t<decltype(make())>::value_type::system);
+        if constexpr (std::is_same_v<System, Balls> || std::is_same_v<System, Ball>) {
             cells.add({name, "ricochet", "scene", 0, [make] {
                            const auto task = make().front();
                            return [scene = scene_of(task), t_end = task.t_end] {

@@ -1,5 +1,5 @@
-// ricochet_measure: target, measured value and verdict of every check, one line
-// each, with the command that repeats it.
+// Target, measured value and verdict of every check, one line each, with the command that repeats
+// it.
 #include "measure.hpp"
 
 #include <fmt/format.h>
@@ -20,25 +20,6 @@ namespace {
 using ricochet::bench::Check;
 using ricochet::bench::Measured;
 
-std::vector<Check> all_checks()
-{
-    namespace bench = ricochet::bench;
-    std::vector<Check> checks;
-    for (const auto& some :
-         {bench::ball_checks(), bench::core_checks(), bench::network_checks(),
-          bench::event_checks(), bench::resolution_checks(), bench::guard_checks(),
-          bench::nonsmooth_checks(), bench::inclusion_checks(), bench::step_checks(),
-          bench::fault_checks(), bench::friction_checks(), bench::file_checks(),
-          bench::host_checks(), bench::taylor_checks(), bench::scene_checks(),
-#ifdef RICOCHET_C
-          bench::c_checks()
-#endif
-         }) {
-        checks.insert(checks.end(), some.begin(), some.end());
-    }
-    return checks;
-}
-
 std::string_view verdict(const Check& check, const Measured& measured)
 {
     if (measured.pass) return "pass";
@@ -54,7 +35,7 @@ Measured run(const Check& check)
     }
 }
 
-int run(int argc, char** argv)
+int run(const std::vector<Check>& checks, int argc, char** argv)
 {
     CLI::App app("Runs what the library must show. Exit status 1 if a check fails.");
     std::vector<std::string> wanted_topics;
@@ -73,7 +54,7 @@ int run(int argc, char** argv)
     nlohmann::json results = nlohmann::json::array();
     bool all_passed = true;
     bool any = false;
-    for (const Check& check : all_checks()) {
+    for (const Check& check : checks) {
         const bool wanted = only.empty() || std::ranges::find(only, check.id) != only.end();
         const bool on_topic = wanted_topics.empty() ||
                               std::ranges::find(wanted_topics, check.topic) != wanted_topics.end();
@@ -116,12 +97,16 @@ int run(int argc, char** argv)
 
 }  // namespace
 
-int main(int argc, char** argv)
+namespace ricochet::bench {
+
+int run_checks(const std::vector<Check>& checks, int argc, char** argv)
 {
     try {
-        return run(argc, argv);
+        return run(checks, argc, argv);
     } catch (const std::exception& error) {
-        fmt::print(stderr, "ricochet_measure: {}\n", error.what());
+        fmt::print(stderr, "{}: {}\n", argv[0], error.what());
         return 2;
     }
 }
+
+}  // namespace ricochet::bench

@@ -29,6 +29,10 @@ struct Check {
     bool required = true;  ///< false: a desired property, which does not fail the run
 };
 
+/// Runs the checks that the arguments name, all by default. Returns the exit status: 1 if a check
+/// fails, 2 if they could not be run.
+[[nodiscard]] int run_checks(const std::vector<Check>& checks, int argc, char** argv);
+
 /// The bouncing ball, end to end.
 [[nodiscard]] std::vector<Check> ball_checks();
 

@@ -68,7 +68,8 @@ template <class X>
 [[gnu::always_inline]] inline void assign(X& to, const X& from)
 {
     if constexpr (is_small<X>) {
-        for_each_component(from, [&](auto i) { to[i] = from[i]; });
+        for_each_component(
+            from, [&](auto i) __attribute__((always_inline)) { to[i] = from[i]; });
     } else {
         to = from;
     }
@@ -100,7 +101,9 @@ template <class X>
             return move_many(to.data(), from.data(), factor, direction.data(), from.size());
         }
     }
-    for_each_component(from, [&](auto i) { to[i] = from[i] + factor * direction[i]; });
+    for_each_component(
+        from, [&](auto i)
+                  __attribute__((always_inline)) { to[i] = from[i] + factor * direction[i]; });
 }
 
 /// Whether every component is finite.
@@ -108,7 +111,8 @@ template <class X>
 [[nodiscard]] bool all_finite(const X& x) noexcept
 {
     double sum = 0;  // 0 * x is NaN where x is not finite
-    for_each_component(x, [&](auto i) { sum += 0 * x[i]; });
+    for_each_component(
+        x, [&](auto i) __attribute__((always_inline)) { sum += 0 * x[i]; });
     return sum == 0;
 }
 
@@ -118,7 +122,8 @@ template <class X>
 {
     if (a.size() != b.size()) return false;
     bool equal = true;
-    for_each_component(a, [&](auto c) { equal = equal && a[c] == b[c]; });
+    for_each_component(
+        a, [&](auto c) __attribute__((always_inline)) { equal = equal && a[c] == b[c]; });
     return equal;
 }
 

@@ -391,7 +391,9 @@ private:
         const Shares shares = sliding_shares(rates).shares;
         const auto weights = shares.weights();
         for_each_component(
-            x, [&](auto i) { dxdt[i] = blend(weights, f[0][i], f[1][i], f[2][i], f[3][i]); });
+            x, [&](auto i) __attribute__((always_inline)) {
+                dxdt[i] = blend(weights, f[0][i], f[1][i], f[2][i], f[3][i]);
+            });
         const std::array residue{surface_rate(0, t, x, dxdt) + restoring(0, t, x),
                                  surface_rate(1, t, x, dxdt) + restoring(1, t, x)};
         const Elimination eliminate(normals(shares, rates), residue, parallel<X>);

@@ -86,7 +86,8 @@ private:
 template <class X>
 [[nodiscard]] X negated(X x)
 {
-    for_each_component(x, [&](auto i) { x[i] = -x[i]; });
+    for_each_component(
+        x, [&](auto i) __attribute__((always_inline)) { x[i] = -x[i]; });
     return x;
 }
 

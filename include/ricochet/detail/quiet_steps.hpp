@@ -114,7 +114,9 @@ private:
     {
         bool still = true;
         for_each_component(
-            x0, [&](auto i) { still &= std::fabs(x1[i] - x0[i]) <= 0x1p-10 * std::fabs(x0[i]); });
+            x0, [&](auto i) __attribute__((always_inline)) {
+                still &= std::fabs(x1[i] - x0[i]) <= 0x1p-10 * std::fabs(x0[i]);
+            });
         return still;
     }
 

@@ -214,7 +214,8 @@ public:
     {
         auto weights = Tableau::dense(s / h);
         for (double& weight : weights) weight *= h;
-        for_each_component(w, [&](auto c) { w[c] = dense(weights, k, rate, c); });
+        for_each_component(
+            w, [&](auto c) __attribute__((always_inline)) { w[c] = dense(weights, k, rate, c); });
     }
 
     /// Weights of the rates in w at the fraction `Part::u` of a step of length h.

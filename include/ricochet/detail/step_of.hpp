@@ -120,17 +120,23 @@ struct StepOf {
         const auto flow = [&](const auto& departure, X& departure_rate, double offset)
             __attribute__((always_inline))
         {
-            for_each_component(of.x0, [&](auto i) {
-                of.room[i] = of.x0[i] + (offset * of.rate0[i] + departure[i]);
-            });
+            for_each_component(
+                of.x0, [&](auto i) __attribute__((always_inline)) {
+                    of.room[i] = of.x0[i] + (offset * of.rate0[i] + departure[i]);
+                });
             ++caller.calls;
             if (caller.backward) {
                 caller.fits &= call(caller, caller.start.plus(-offset), of.room, departure_rate);
                 for_each_component(
-                    of.x0, [&](auto i) { departure_rate[i] = -departure_rate[i] - of.rate0[i]; });
+                    of.x0, [&](auto i) __attribute__((always_inline)) {
+                        departure_rate[i] = -departure_rate[i] - of.rate0[i];
+                    });
             } else {
                 caller.fits &= call(caller, caller.start.plus(offset), of.room, departure_rate);
-                for_each_component(of.x0, [&](auto i) { departure_rate[i] -= of.rate0[i]; });
+                for_each_component(
+                    of.x0, [&](auto i) __attribute__((always_inline)) {
+                        departure_rate[i] -= of.rate0[i];
+                    });
             }
         };
         if constexpr (ours) {
@@ -166,7 +172,8 @@ struct StepOf {
     {
         X to{};
         if constexpr (ours) {
-            for_each_component(to, [&](auto i) { to[i] = from[own(i, from)]; });
+            for_each_component(
+                to, [&](auto i) __attribute__((always_inline)) { to[i] = from[own(i, from)]; });
         } else {
             copy_state(from, to);
         }
@@ -200,16 +207,22 @@ struct StepOf {
     /// Computes the end of a step from its departure; false if it is not finite.
     [[gnu::always_inline]] static bool end([[maybe_unused]] Caller& caller, double h, Values& of)
     {
-        for_each_component(of.x0, [&](auto i) {
-            of.x1[i] = of.x0[i] + (h * of.rate0[i] + (of.w[i] + of.remainder[i]));
-        });
+        for_each_component(
+            of.x0, [&](auto i) __attribute__((always_inline)) {
+                of.x1[i] = of.x0[i] + (h * of.rate0[i] + (of.w[i] + of.remainder[i]));
+            });
         if constexpr (is_fsal<Stepper>) {
-            for_each_component(of.x0, [&](auto i) { of.rate1[i] = of.rate0[i] + of.w_rate[i]; });
+            for_each_component(
+                of.x0, [&](auto i) __attribute__((always_inline)) {
+                    of.rate1[i] = of.rate0[i] + of.w_rate[i];
+                });
         } else {
             ++caller.calls;
             caller.fits &= call(caller, caller.time(h), of.x1, of.rate1);
             if (caller.backward) {
-                for_each_component(of.x0, [&](auto i) { of.rate1[i] = -of.rate1[i]; });
+                for_each_component(
+                    of.x0, [&](auto i)
+                               __attribute__((always_inline)) { of.rate1[i] = -of.rate1[i]; });
             }
         }
         return all_finite(of.x1) && all_finite(of.rate1);
@@ -230,11 +243,12 @@ struct StepOf {
     {
         double worst = 0;
         double lost = 0;
-        for_each_component(of.x0, [&](auto i) {
-            const double ratio = ratio_of(of.error[i], of.x0[i], of.x1[i], rtol, atol(i));
-            worst = ratio > worst ? ratio : worst;
-            lost += 0 * ratio;  // NaN where it is not finite
-        });
+        for_each_component(
+            of.x0, [&](auto i) __attribute__((always_inline)) {
+                const double ratio = ratio_of(of.error[i], of.x0[i], of.x1[i], rtol, atol(i));
+                worst = ratio > worst ? ratio : worst;
+                lost += 0 * ratio;  // NaN where it is not finite
+            });
         return worst + lost;
     }
 
@@ -242,20 +256,23 @@ struct StepOf {
                                                      double rtol, double atol) noexcept
     {
         if (const double* const each = step.component_atol) {
-            return worst_ratio(of, rtol, [&](auto i) { return each[i]; });
+            return worst_ratio(
+                of, rtol, [&](auto i) __attribute__((always_inline)) { return each[i]; });
         }
-        return worst_ratio(of, rtol, [&](auto) { return atol; });
+        return worst_ratio(
+            of, rtol, [&](auto) __attribute__((always_inline)) { return atol; });
     }
 
     /// Finds the remainder at the end of a step that was computed with other states.
     static void find_remainder([[maybe_unused]] State& step, [[maybe_unused]] double h)
     {
         if constexpr (!is_small<C>) {
-            for_each_component(step.x0, [&](auto i) {
-                step.large.remainder1[i] =
-                    two_sum(step.x0[i], h * step.rate0[i] + (step.w[i] + step.remainder[i]))
-                        .remainder;
-            });
+            for_each_component(
+                step.x0, [&](auto i) __attribute__((always_inline)) {
+                    step.large.remainder1[i] =
+                        two_sum(step.x0[i], h * step.rate0[i] + (step.w[i] + step.remainder[i]))
+                            .remainder;
+                });
         }
     }
 };

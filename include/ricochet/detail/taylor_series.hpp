@@ -21,8 +21,22 @@
 #include <type_traits>
 #include <utility>
 
+#include "ricochet/detail/taylor_step.hpp"
 #include "ricochet/detail/taylor_sums.hpp"
 #include "ricochet/detail/taylor_tape.hpp"
+
+// The same code is compiled for AVX2 too, where the processor may have it. Two coefficients in one
+// register would have to wait for both to be stored: g++ is told not to put them there.
+#if defined(__x86_64__) && !defined(__AVX2__)
+#define RICOCHET_WIDE_SERIES 1
+#if defined(__clang__)
+#define RICOCHET_FOR_AVX2 [[gnu::target("avx2")]]
+#else
+#define RICOCHET_FOR_AVX2 [[gnu::target("avx2"), gnu::optimize("no-tree-slp-vectorize")]]
+#endif
+#else
+#define RICOCHET_WIDE_SERIES 0
+#endif
 
 namespace ricochet::detail {
 
@@ -74,8 +88,21 @@ public:
     /// The coefficients at (t, x), up to an order that is `most`, `most` - 4 or `most` - 8.
     static void compute(const S* constants, S t, const S* x, const TaylorCoefficients<S>& to)
     {
+#if RICOCHET_WIDE_SERIES
+        if constexpr (unrolled && most > least_taylor_order) {
+            if (__builtin_cpu_supports("avx2")) return compute_wide(constants, t, x, to);
+        }
+#endif
         compute_inline(constants, t, x, to);
     }
+#if RICOCHET_WIDE_SERIES
+    /// With the instructions of AVX2, three operands each; none of them rounds otherwise.
+    RICOCHET_FOR_AVX2 static void compute_wide(const S* constants, S t, const S* x,
+                                               const TaylorCoefficients<S>& to)
+    {
+        compute_inline(constants, t, x, to);
+    }
+#endif
     /// The same, for callers that are compiled for another machine.
     [[gnu::always_inline]] static void compute_inline(const S* constants, const S& t, const S* x,
                                                       const TaylorCoefficients<S>& to)
@@ -115,8 +142,14 @@ private:
     {
         return tape.ops[static_cast<std::size_t>(i)];
     }
-    [[nodiscard]] static constexpr int smaller(int a, int b) noexcept { return a < b ? a : b; }
-    [[nodiscard]] static constexpr int larger(int a, int b) noexcept { return a > b ? a : b; }
+    [[nodiscard]] static constexpr int smaller(int a, int b) noexcept
+    {
+        return a < b ? a : b;
+    }
+    [[nodiscard]] static constexpr int larger(int a, int b) noexcept
+    {
+        return a > b ? a : b;
+    }
 
     template <int... k>
     [[gnu::always_inline]] void unroll(int order, S* out, std::integer_sequence<int, k...>)
