@@ -42,15 +42,16 @@ void require_finite(std::string_view who, std::string_view parameter, double giv
 void require_above(std::string_view who, std::string_view parameter, double given,
                    std::string_view other, double bound)
 {
-    require(given > bound && std::isfinite(given), who, parameter,
-            fmt::format("be finite and above {} {}", other, bound), given);
+    if (given > bound && std::isfinite(given)) return;  // before the text is written
+    require(false, who, parameter, fmt::format("be finite and above {} {}", other, bound), given);
 }
 
 void require_at_least(std::string_view who, std::string_view parameter, double given,
                       std::string_view other, double bound)
 {
-    require(given >= bound && std::isfinite(given), who, parameter,
-            fmt::format("be finite and at least {} {}", other, bound), given);
+    if (given >= bound && std::isfinite(given)) return;
+    require(false, who, parameter, fmt::format("be finite and at least {} {}", other, bound),
+            given);
 }
 
 }  // namespace ricochet::detail
