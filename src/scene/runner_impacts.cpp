@@ -164,14 +164,15 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
     for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
         const FaceGap at = world_.moving_gap(f, body.radius, p, now_);
         const Vector2 w = world_.surface_velocity(f, now_);
-        double tolerance = World::rounding(p, body.radius) +
-                           World::rounding(world_.faces[f].at, 0) +
-                           2 * resolution(now_) * std::fabs(dot(v - w, at.normal));
+        const double rounding =
+            World::rounding(p, body.radius) + World::rounding(world_.faces[f].at, 0);
+        double tolerance = rounding + 2 * resolution(now_) * std::fabs(dot(v - w, at.normal));
         if (known_to_group(i, true, f)) tolerance += loose_motion(f, body.radius + norm(p));
         if (f != sure && !(at.gap <= tolerance && at.gap >= -1e3 * tolerance)) continue;
-        // Where two segments meet, both have the corner.
+        // Where two segments meet, both have the corner, each by a rounding of its own.
+        const Vector2 foot = p - body.radius * at.normal;
         const bool again = std::ranges::any_of(cluster_.contacts, [&](const Contact& c) {
-            return c.a == i && c.moving && c.normal == at.normal &&
+            return c.a == i && c.moving && norm(c.at - foot) <= rounding &&
                    world_.faces[c.b].surface == world_.faces[f].surface;
         });
         if (again) continue;

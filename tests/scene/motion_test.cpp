@@ -227,6 +227,24 @@ TEST(SceneMotion, DragMeetsAMovingFloorOnTheMethodsMap)
     }
 }
 
+TEST(SceneMotion, ACornerOfTerrainThatMovesIsStruckOnce)
+{
+    std::mt19937_64 random(5);
+    std::uniform_real_distribution<double> uniform(0.2, 1);
+    for (int k = 0; k < 200; ++k) {
+        Scene scene;
+        scene.terrain({.points = {{-uniform(random), -uniform(random)},
+                                  {0.1 * uniform(random), uniform(random)},
+                                  {uniform(random), -uniform(random)}},
+                       .closed = true,
+                       .motion = ConstantVelocity{{0.01 * uniform(random), 0}}});
+        scene.disc({.at = {0.06, 2}, .velocity = {0, -uniform(random)}, .radius = 0.5});
+        const SceneRun run = simulate(scene, {.t_end = 20});
+        ASSERT_EQ(run.events.size(), 1u) << k;
+        EXPECT_EQ(run.statistics.impacts, 1u);
+    }
+}
+
 TEST(SceneMotion, FrictionOnATableThatMovesSidewaysTakesOfTheSlip)
 {
     // Falls with 1 m/s onto a table that goes 2 m/s sideways: the impulse of 2 m with friction 0.1
