@@ -20,8 +20,8 @@ constexpr std::size_t patience = 100;
 /// The same in lasting contact, whose next step takes the remaining impacts without restitution.
 constexpr std::size_t lasting_patience = 4;
 
-/// Limits: sweeps alone for few contacts; sweeps before an exact solution; sweeps for many
-/// contacts.
+/// Limits: contacts for which sweeps suffice if they end; contacts of an exact solution; sweeps
+/// before it; sweeps where there is none.
 constexpr std::size_t few = 4;
 constexpr std::size_t most_exact = 600;
 constexpr int few_sweeps = 30;
@@ -166,16 +166,26 @@ void Impacts::solve(Cluster& cluster) const
         contact.target = contact.restitution * std::max(u, 0.0);
         friction = friction || contact.friction > 0;
     }
-    const bool coupled = !cluster.couplings.empty();
-    if (!friction && !coupled && struck_.size() > few && struck_.size() <= most_exact) {
-        const std::vector<Vector2> start = cluster.after;
-        sweep(cluster, 0.5 * epsilon * fastest, few_sweeps);
+    const double smallest = 0.5 * epsilon * fastest;
+    const std::vector<Vector2> start = cluster.after;
+    const bool exact = cluster.couplings.empty() && struck_.size() <= most_exact;
+    if (exact && !friction) {
+        if (sweep(cluster, smallest, few_sweeps) && struck_.size() <= few) return;
         cluster.after = start;
         if (solve_exactly(cluster)) return;
         cluster.after = start;
         for (const std::uint32_t k : struck_) cluster.contacts[k].impulse = 0;
     }
-    sweep(cluster, 0.5 * epsilon * fastest, most_sweeps);
+    if (sweep(cluster, smallest, most_sweeps) || !exact || !friction) return;
+    // Where a heavy body presses a light one on others, the number of sweeps grows with the ratio
+    // of their masses: these begin with the normal impulses without friction.
+    cluster.after = start;
+    for (const std::uint32_t k : struck_) cluster.contacts[k].tangential = 0;
+    if (!solve_exactly(cluster)) {
+        cluster.after = start;
+        for (const std::uint32_t k : struck_) cluster.contacts[k].impulse = 0;
+    }
+    sweep(cluster, smallest, most_sweeps);
 }
 
 double Impacts::kinetic_energy(const Cluster& cluster) const
@@ -253,8 +263,9 @@ void Impacts::solve_without_gain(Cluster& cluster)
     }
 }
 
-/// Solves one contact after another, until no velocity changes by more than `smallest`.
-void Impacts::sweep(Cluster& cluster, double smallest, int most) const
+/// Solves one contact after another, until no velocity changes by more than `smallest`; false where
+/// `most` sweeps do not suffice.
+bool Impacts::sweep(Cluster& cluster, double smallest, int most) const
 {
     for (int k = 0; k < most; ++k) {
         double largest = 0;
@@ -278,8 +289,9 @@ void Impacts::sweep(Cluster& cluster, double smallest, int most) const
             }
             push(cluster, contact, impulse);
         }
-        if (largest <= smallest) return;
+        if (largest <= smallest) return true;
     }
+    return false;
 }
 
 /// Stops bodies that are slower than the rounding of the fastest: `sweep` is not more accurate, and

@@ -93,7 +93,7 @@ private:
     [[nodiscard]] double work_of_surfaces(const Cluster& cluster) const;
     [[nodiscard]] double size_of_works(const Cluster& cluster) const;
     bool solve_exactly(Cluster& cluster) const;
-    void sweep(Cluster& cluster, double smallest, int most) const;
+    bool sweep(Cluster& cluster, double smallest, int most) const;
     void stop_slow(Cluster& cluster) const;
     bool wave(Cluster& cluster);
     void emit(const Cluster& cluster, double t, std::vector<SceneEvent>* events);

@@ -137,6 +137,23 @@ TEST(Impacts, AllTogetherIsNewtonsLawForTheWholeCradle)
     for (std::size_t i = 1; i < 5; ++i) EXPECT_NEAR(run.bodies[i].velocity[0], 0.4, 1e-14);
 }
 
+TEST(Impacts, AllTogetherIsNewtonsLawForAnyMasses)
+{
+    for (const double friction : {0.0, 0.3}) {
+        for (const double mass : {1.0, 1e3, 1e4, 1e6}) {
+            Scene scene;
+            const MaterialId material = scene.material({.restitution = 0.5, .friction = friction});
+            scene.wall({.normal = {0, 1}, .material = material});
+            scene.disc({.at = {0, 1}, .material = material});
+            scene.disc({.at = {0, 4}, .velocity = {0, -1}, .mass = mass, .material = material});
+            const SceneRun run = simulate(scene, {.t_end = 2, .impacts = ImpactLaw::together});
+            EXPECT_NEAR(run.bodies[0].velocity[1], 0, 1e-15 * mass) << mass;
+            EXPECT_NEAR(run.bodies[1].velocity[1], 0.5, 1e-15 * mass) << mass;
+            EXPECT_EQ(run.statistics.impacts, 2u) << mass;
+        }
+    }
+}
+
 /// A disc strikes two that touch it at +-30 degrees at one time.
 Scene wedge(bool swapped)
 {
