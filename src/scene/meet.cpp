@@ -233,13 +233,12 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
     const double closed = on ? rounding : 0;
     double rate = dot(path.c[1], normal);
     const double bend = dot(path.c[2], normal);
+    // On the method's own map, as the line is met: the polynomial of a step passes both segments of
+    // a corner by its error.
     const auto lands = [&](double s, bool side) {
         if (!segment || !std::isfinite(s)) return true;
-        Path at = path;
-        for (std::size_t k = 4; k-- > 0;) {
-            for (std::size_t j = k; j < 4; ++j) at.c[j] = at.c[j] + s * at.c[j + 1];
-        }
-        return lands_on(world, b, which, side, at.c[0], at.c[1]);
+        const Instant t = b.t.after(s);
+        return lands_on(world, b, which, side, world.position(i, t), world.velocity(i, t));
     };
     Meeting meeting{.from = b.t};
     const Polynomial c{gap, rate, bend, dot(path.c[3], normal), dot(path.c[4], normal)};

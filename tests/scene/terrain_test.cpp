@@ -234,6 +234,22 @@ TEST(Terrain, SmallDiscsInPolygonsStayInside)
     for (std::uint64_t seed = 0; seed < 4000; ++seed) stays_inside(seed, 0.01);
 }
 
+TEST(Terrain, APointWithDragThatFliesIntoACornerIsThrownBack)
+{
+    std::mt19937_64 random(1);
+    std::uniform_real_distribution<double> uniform(-0.3, 0.3);
+    for (int k = 0; k < 200; ++k) {
+        const Vector2 corner{0, 0.5 + uniform(random)};
+        const Vector2 at{uniform(random), -1 + uniform(random)};
+        Scene scene;
+        scene.terrain({.points = {{-1, 0}, corner, {1, 0}}});
+        scene.point({.at = at,
+                     .velocity = {3 * (corner[0] - at[0]), 3 * (corner[1] - at[1])},
+                     .drag = 0.03 + std::fabs(uniform(random))});
+        EXPECT_FALSE(simulate(scene, {.t_end = 1}).events.empty()) << k;
+    }
+}
+
 TEST(Terrain, ALineLongerThanAnyNumberOfCellsIsStruckWhereItIs)
 {
     constexpr double radius = 0.1;
