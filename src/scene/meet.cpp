@@ -183,6 +183,13 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
     return meeting;
 }
 
+/// [m] Distance beyond its ends up to which a segment is met: that of `World::leads_off` for discs,
+/// so that no disc leaves a segment before it is on the next one.
+static double slack_of(const Face& face, double radius, const Vector2& p)
+{
+    return radius == 0 ? World::end_slack(face, p) : 0.5 * World::rounding(p, 0);
+}
+
 FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above)
 {
     const double radius = body.radius;
@@ -190,8 +197,7 @@ FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool abov
         return {dot(p - face.at, face.normal) - radius, face.normal};
     }
     if (face.kind == Face::Kind::segment) {
-        const double slack = radius == 0 ? World::end_slack(face, p) : 8 * epsilon * face.length;
-        if (!lies_on(face, p, slack)) return {};
+        if (!lies_on(face, p, slack_of(face, radius, p))) return {};
         const Vector2 normal = above ? face.normal : -1.0 * face.normal;
         return {dot(p - face.at, normal) - radius, normal};
     }
@@ -212,7 +218,7 @@ static bool lands_on(const World& world, const Body& body, std::uint32_t which, 
                      const Vector2& p, const Vector2& v)
 {
     const Face& face = world.faces[which];
-    if (body.radius > 0) return lies_on(face, p, 0);
+    if (body.radius > 0) return lies_on(face, p, slack_of(face, body.radius, p));
     return world.holds(face, p) && !world.passes_end(body, which, above, p, v);
 }
 
@@ -228,8 +234,7 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
     const double gap = dot(path.c[0] - face.at, normal) - b.radius;
     const double rounding = World::rounding(path.c[0], b.radius) + World::rounding(face.at, 0);
     // A body on the line beside a segment reaches its end a little later.
-    const bool on =
-        !segment || lies_on(face, path.c[0], b.radius > 0 ? 0 : World::end_slack(face, path.c[0]));
+    const bool on = !segment || lies_on(face, path.c[0], slack_of(face, b.radius, path.c[0]));
     const double closed = on ? rounding : 0;
     double rate = dot(path.c[1], normal);
     const double bend = dot(path.c[2], normal);

@@ -250,6 +250,38 @@ TEST(Terrain, APointWithDragThatFliesIntoACornerIsThrownBack)
     }
 }
 
+TEST(Terrain, ADiscThatSlidesOverAJointStaysOnTheLine)
+{
+    std::mt19937_64 random(3);
+    std::uniform_real_distribution<double> part(0, 1);
+    for (int k = 0; k < 400; ++k) {
+        Scene scene({.gravity = {0, -1 - 9 * part(random)}});
+        const MaterialId soft = scene.material({.restitution = 0});
+        // Beside long coordinates the ends of both halves are rounded.
+        const Vector2 joint{100 * part(random), 100 * part(random)};
+        const Vector2 along{0.3 + part(random), 0.3 + part(random)};
+        const double length = std::hypot(along[0], along[1]);
+        const Vector2 normal{-along[1] / length, along[0] / length};
+        scene.terrain({.points = {{joint[0] - along[0], joint[1] - along[1]},
+                                  joint,
+                                  {joint[0] + along[0], joint[1] + along[1]}},
+                       .material = soft});
+        const double radius = 0.03 + 0.1 * part(random);
+        const double high = radius + 0.02;
+        scene.disc({.at = {joint[0] + 0.5 * along[0] + high * normal[0],
+                           joint[1] + 0.5 * along[1] + high * normal[1]},
+                    .radius = radius,
+                    .material = soft});
+        SceneOptions options{.t_end = 4, .max_events = 1000};
+        for (int i = 1; i < 400; ++i) options.sample_times.push_back(0.01 * i);
+        for (const auto& row : simulate(scene, options).samples) {
+            const Vector2 p{row[0].at[0] - joint[0], row[0].at[1] - joint[1]};
+            if (p[0] * along[0] + p[1] * along[1] < -length * length) break;
+            ASSERT_GT(p[0] * normal[0] + p[1] * normal[1], radius - 1e-12) << k;
+        }
+    }
+}
+
 TEST(Terrain, ALineLongerThanAnyNumberOfCellsIsStruckWhereItIs)
 {
     constexpr double radius = 0.1;
