@@ -28,6 +28,15 @@ void require_vector(const Vector2& given, std::string_view what)
     for (const double component : given) require_finite(who, what, component);
 }
 
+/// Requires components whose squares, and their sums, are finite.
+void require_moderate(const Vector2& given, std::string_view what)
+{
+    require_vector(given, what);
+    for (const double component : given) {
+        require(std::fabs(component) <= 1e150, who, what, "lie in [-1e150, 1e150]", component);
+    }
+}
+
 /// Overlap of touching bodies that the rounding of their coordinates allows.
 double rounding_of(const Vector2& at, double radius)
 {
@@ -140,8 +149,8 @@ BodyId Scene::add(const Disc& body, std::string_view kind)
     const std::string label =
         body.name.empty() ? fmt::format("{} {}", kind, bodies_.size()) : body.name;
     const std::string prefix = label + ": ";
-    require_vector(body.at, prefix + "position");
-    require_vector(body.velocity, prefix + "velocity");
+    require_moderate(body.at, prefix + "position");
+    require_moderate(body.velocity, prefix + "velocity");
     require_positive(who, prefix + "mass", body.mass);
     require_not_negative(who, prefix + "drag", body.drag);
     require_material(body.material, label);

@@ -149,6 +149,11 @@ TEST(Scene, WrongValuesAreRefusedInOneSentence)
               }),
               "Scene: the normal of a wall has no length");
     for (const double size : {1e-300, 1e300}) EXPECT_NO_THROW(scene.wall({.normal = {0, size}}));
+    // Their squares overflow: such discs flew through walls.
+    EXPECT_EQ(disc({.name = "b", .velocity = {0, -1e160}}),
+              "Scene: b: velocity must lie in [-1e150, 1e150], got -1e+160");
+    EXPECT_EQ(disc({.name = "b", .at = {1e160, 0}}),
+              "Scene: b: position must lie in [-1e150, 1e150], got 1e+160");
     scene.disc({.name = "b", .at = {1.5, 5}});
     EXPECT_EQ(refusal([&] { static_cast<void>(simulate(scene, {.t_end = 1})); }),
               "Scene: a and b overlap by 0.5 at the start");
