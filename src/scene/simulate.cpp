@@ -178,6 +178,21 @@ void sort_events(SceneRun& run)
     run.events = std::move(sorted);
 }
 
+/// Refuses an oscillation whose phase the time does not resolve to 1e-4 of a period; the number of
+/// its periods would keep the search for an impact from ending, too.
+void require_resolved(const Scene& scene, const SceneOptions& options)
+{
+    const double t = std::max(std::fabs(options.t_start), std::fabs(options.t_end));
+    for (std::uint32_t k = 0; k < scene.surfaces().size(); ++k) {
+        const auto* of = std::get_if<Oscillation>(&scene.surfaces()[k].motion);
+        if (!of || of->frequency * t <= 1e12) continue;
+        Refuse{"simulate"}(
+            fmt::format("motion of {}: at most 1e12 periods from time 0 to {:g} s can be resolved, "
+                        "and a frequency of {:g} Hz gives {:g}",
+                        scene.name_of(SurfaceId{k}), t, of->frequency, of->frequency * t));
+    }
+}
+
 }  // namespace
 
 SceneRun simulate(const Scene& scene, const SceneOptions& options)
@@ -192,6 +207,7 @@ SceneRun detail::simulate(const Scene& scene, const SceneOptions& wanted, const 
     // The times of events determine the last one.
     options.record_events |= wanted.max_events != SceneOptions{}.max_events;
     scene.check(options.t_start);
+    require_resolved(scene, options);
     scene.require_room(0);
     Failure failure;
     SceneRun run = run_until(scene, options, tuning, options.t_end, &failure);

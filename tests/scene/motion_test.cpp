@@ -333,6 +333,11 @@ TEST(SceneMotion, WhatIsNoMotionIsRefusedInASentence)
     EXPECT_EQ(refusal([&] { scene.check(); }),
               "Scene: slide is terrain that moves, which discs alone can meet, and there is a "
               "point");
+    EXPECT_EQ(refusal([&] {
+                  static_cast<void>(simulate(ball_above(Oscillation{{0, 1}, 1e13}), {.t_end = 1}));
+              }),
+              "simulate: motion of table: at most 1e12 periods from time 0 to 1 s can be resolved, "
+              "and a frequency of 1e+13 Hz gives 1e+13");
     // The position at the start matters.
     EXPECT_NE(refusal([&] {
                   ball_above(ConstantVelocity{{0, 1}}).check(2);
