@@ -138,6 +138,15 @@ class Reports(unittest.TestCase):
         self.assertIn("They disagree", " ".join(page.remarks(one, far)))
         self.assertIn("too noisy to tell", " ".join(page.remarks(one, loud)))
 
+    def test_cells_whose_own_samples_spread_are_too_noisy_to_tell(self):
+        one = report([("a", "ricochet", 1.0), ("b", "GSL", 4.0)], [1e-9] * 10)
+        far = report([("a", "ricochet", 1.0), ("b", "GSL", 5.6)], [1e-9] * 10)
+        for row in far["rows"]:
+            row["samples"] = [row["samples"][0] * factor for factor in (1, 1.5, 1.5)]
+        status, said = compare.verdict(one, far)
+        self.assertEqual(status, 3)
+        self.assertIn("2 of the other 2 are too noisy to tell", " ".join(said))
+
     def test_reports_of_other_commits_or_rows_are_said_to_be(self):
         one = report([("a", "ricochet", 1.0), ("b", "GSL", 4.0)], [1e-9])
         other = report([("c", "ricochet", 1.0), ("d", "GSL", 4.0)], [1e-9])

@@ -3,8 +3,8 @@
 
     compare.py report.json other.json
 
-Exit status: 0 if every ratio agrees within 15 %, 1 if some do not, 3 if some do not and one of the
-reports was made on a machine that was too noisy to tell.
+Exit status: 0 if every ratio agrees within 15 %, 1 if some do not, 3 if some do not and their own
+samples or one of the machines were too noisy to tell.
 """
 import json
 import math
@@ -62,6 +62,14 @@ def verdict(report, older):
     said.append(f"{len(departures) - apart} of {len(departures)} ratios of the two reports agree "
                 f"within {100 * AGREEMENT:.0f} %; the largest departure is {percent:.0f} % "
                 f"({name}).")
+    wide = {row["name"] for of in (report, older) for row in of["rows"]
+            if row["samples"] and spread(row["samples"]) > NOISY}
+    unclear = sum(departure > AGREEMENT and name in wide for departure, name in departures)
+    if unclear:
+        said.append(f"{unclear} of the other {apart} are too noisy to tell: a tenth of their own "
+                    f"samples were {100 * NOISY:.0f} % above the shortest or more.")
+    if unclear == apart:
+        return 3, said
     noise = max(spread(report["yardstick"]), spread(older["yardstick"]))
     if noise > NOISY:
         said.append(f"**The machine was too noisy to tell**: a tenth of the yardstick's samples "
