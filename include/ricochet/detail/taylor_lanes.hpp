@@ -22,13 +22,6 @@
 #include "ricochet/detail/taylor_series.hpp"
 #include "ricochet/detail/taylor_step.hpp"
 
-// The same code is compiled for registers of four doubles too, where the processor may have them.
-#if defined(__x86_64__) && !defined(__AVX2__)
-#define RICOCHET_WIDE_LANES 1
-#else
-#define RICOCHET_WIDE_LANES 0
-#endif
-
 namespace ricochet::detail {
 
 /// As `find_reach` of one run.
@@ -147,12 +140,12 @@ constexpr bool lanes_are_wide = true;
 #else
 constexpr bool lanes_are_wide = false;
 #endif
-constexpr bool lanes_may_be_wide = lanes_are_wide || RICOCHET_WIDE_LANES;
+constexpr bool lanes_may_be_wide = lanes_are_wide || RICOCHET_WIDE_SERIES;
 
 /// Whether the processor has registers of four doubles.
 [[nodiscard]] inline bool has_wide_lanes() noexcept
 {
-#if RICOCHET_WIDE_LANES
+#if RICOCHET_WIDE_SERIES
     return __builtin_cpu_supports("avx2");
 #else
     return lanes_are_wide;
@@ -248,11 +241,11 @@ public:
 
     /// Takes steps of the active runs until some of them do not take their next step here.
     /// Returns these runs, one bit each.
-    [[nodiscard]] unsigned advance() requires(!wide || !RICOCHET_WIDE_LANES)
+    [[nodiscard]] unsigned advance() requires(!wide || !RICOCHET_WIDE_SERIES)
     {
         return advance_inline();
     }
-#if RICOCHET_WIDE_LANES
+#if RICOCHET_WIDE_SERIES
     [[nodiscard, gnu::target("avx2")]] unsigned advance() requires wide
     {
         return advance_inline();
