@@ -170,7 +170,7 @@ class Clock:
         if n > 1:  # anew, over more than one run
             single = max(worker.ask(f"time {n}")["seconds"] / n, 1e-7)
             n = max(1, round(self.options.sample / single))
-        affordable = int(self.options.seconds / (n * single))
+        affordable = max(int(self.options.seconds / (n * single)), min(8, int(2 / single)))
         return n, max(3 if single < 5 else 1, min(self.options.rounds, affordable))
 
     def run(self, timed, yardstick):

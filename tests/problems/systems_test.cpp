@@ -303,6 +303,23 @@ TEST(ImpactOscillator, ThousandPeriodsHaveTheExactImpacts)
     }
 }
 
+TEST(ImpactOscillator, ExactImpactsEndWhereTheMassComesToRestAtTheWall)
+{
+    // A slow force presses the mass against the wall, and flights become shorter by the restitution
+    // until their heights are lost in rounding: here 2e-9 s after some forty of them, not less.
+    const double restitution = 0.57051402692391884;
+    const ImpactOscillator oscillator({.frequency = 0.43597592109397371,
+                                       .wall = 0.3578622610174616,
+                                       .restitution = restitution,
+                                       .damping = 0.030578733450074402});
+    const std::vector<double> times = oscillator.impacts(20 * oscillator.period());
+    ASSERT_GT(times.size(), 30U);
+    ASSERT_LT(times.size(), 60U);
+    const std::size_t n = 30;
+    EXPECT_NEAR((times[n] - times[n - 1]) / (times[n - 1] - times[n - 2]), restitution, 1e-4);
+    EXPECT_NEAR(times.back(), 16.9078745, 1e-6);
+}
+
 TEST(ImpactOscillator, OtherParametersHaveTheirExactImpacts)
 {
     // The velocity at impacts is a few tenths at least.

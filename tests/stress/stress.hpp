@@ -28,6 +28,9 @@ struct Size {
     }
 };
 
+/// Shows on a terminal, once a second, how many cases of the class that runs are done.
+void show(std::uint64_t cases);
+
 struct Tally {
     std::uint64_t cases = 0;
     std::uint64_t wrong = 0;
@@ -36,7 +39,7 @@ struct Tally {
 
     void expect(bool holds, const auto& describe)
     {
-        ++cases;
+        show(++cases);
         if (holds) return;
         ++wrong;
         if (first_wrong.size() < 10) first_wrong.push_back(describe());

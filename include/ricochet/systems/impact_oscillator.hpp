@@ -78,7 +78,8 @@ public:
     /// each flight in long double, searched in steps of a 128th of the faster of the two
     /// oscillations. Two impacts within one such step of each other are missed only if
     /// the velocity changes its sign more than once in between. The times end early
-    /// where flights become shorter than 1e-9 s, as before the mass comes to rest at the wall.
+    /// where flights become shorter than 1e-9 s, or lower than a hundred roundings of the
+    /// displacement, as before the mass comes to rest at the wall.
     [[nodiscard]] std::vector<double> impacts(double t_end) const;
 
 private:
