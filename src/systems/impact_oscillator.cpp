@@ -16,6 +16,7 @@ using Real = long double;
 struct Motion {
     Real u;
     Real v;
+    Real a = 0;
 };
 
 /// The motion between impacts, as a function of the time since the last:
@@ -44,7 +45,8 @@ public:
         const Real cosine = std::cos(k_ * s);
         const Real sine = std::sin(k_ * s);
         const Real u = decay * (p_ * cosine + q_ * sine);
-        return {forced.u + u, forced.v + decay * k_ * (q_ * cosine - p_ * sine) - c_ / 2 * u};
+        const Real v = decay * k_ * (q_ * cosine - p_ * sine) - c_ / 2 * u;
+        return {forced.u + u, forced.v + v, forced.a - c_ * v - u};
     }
 
     /// Rounding of a displacement.
@@ -60,7 +62,8 @@ private:
         const Real angle = w_ * (t0_ + s);
         const Real cosine = std::cos(angle);
         const Real sine = std::sin(angle);
-        return {a_ * cosine + b_ * sine, w_ * (b_ * cosine - a_ * sine)};
+        const Real u = a_ * cosine + b_ * sine;
+        return {u, w_ * (b_ * cosine - a_ * sine), -w_ * w_ * u};
     }
 
     Real w_, c_, k_, t0_;
@@ -79,20 +82,38 @@ Real bisect(Real lo, Real hi, const Positive& positive)
     }
 }
 
+/// The point in (lo, hi) at which `value` changes its sign; hi if it does not.
+template <class Value>
+Real change_of_sign(Real lo, Real hi, const Value& value)
+{
+    const bool positive = value(lo) > 0;
+    if (positive == (value(hi) > 0)) return hi;
+    return bisect(lo, hi, [&](Real s) { return (value(s) > 0) == positive; });
+}
+
 /// The first time in (0, longest] at which the flight reaches the wall; negative: none.
+///
+/// A step is divided where the acceleration changes its sign, and each part where the velocity
+/// does: between these points the displacement is monotone.
 Real first_impact(const Flight& flight, Real wall, Real step, Real longest)
 {
     const auto inside = [&](Real s) { return flight(s).u < wall; };
-    const auto rising = [&](Real s) { return flight(s).v > 0; };
+    const auto velocity = [&](Real s) { return flight(s).v; };
+    const auto acceleration = [&](Real s) { return flight(s).a; };
     Real s = 0;
     Motion here = flight(0);
     while (s < longest) {
         const Real next = s + step;
         const Motion there = flight(next);
-        if (there.u >= wall) return bisect(s, next, inside);
-        if (here.v > 0 && there.v <= 0) {
-            const Real crest = bisect(s, next, rising);
-            if (!inside(crest)) return bisect(s, crest, inside);
+        if ((here.v > 0) == (there.v > 0) && (here.a > 0) == (there.a > 0)) {
+            if (there.u >= wall) return bisect(s, next, inside);
+        } else {
+            for (const Real hi : {change_of_sign(s, next, acceleration), next}) {
+                for (const Real end : {change_of_sign(s, hi, velocity), hi}) {
+                    if (!inside(end)) return bisect(s, end, inside);
+                    s = end;
+                }
+            }
         }
         s = next;
         here = there;

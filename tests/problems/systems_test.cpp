@@ -320,6 +320,21 @@ TEST(ImpactOscillator, ExactImpactsEndWhereTheMassComesToRestAtTheWall)
     EXPECT_NEAR(times.back(), 16.9078745, 1e-6);
 }
 
+TEST(ImpactOscillator, ExactImpactsIncludeALowOneWhileTheForceReleasesTheMass)
+{
+    // The last flight before the release, 0.01 s long, rises and is drawn back within one step
+    // of the search.
+    const ImpactOscillator oscillator({.frequency = 0.64676998199290758,
+                                       .wall = 0.20179036747016277,
+                                       .restitution = 0.48402883259190876,
+                                       .damping = 0.26892575918342682});
+    const std::vector<double> exact = oscillator.impacts(30);
+    const auto run =
+        integrate(oscillator, ImpactOscillator::start, {.t_end = 30, .rtol = 1e-13, .atol = 1e-13});
+    ASSERT_EQ(run.events.size(), exact.size());
+    for (std::size_t i = 0; i < exact.size(); ++i) EXPECT_NEAR(run.events[i].t, exact[i], 1e-9);
+}
+
 TEST(ImpactOscillator, OtherParametersHaveTheirExactImpacts)
 {
     // The velocity at impacts is a few tenths at least.

@@ -76,10 +76,9 @@ public:
 
     /// Times [s] of all impacts from `start` at time 0 up to `t_end`: the closed form of
     /// each flight in long double, searched in steps of a 128th of the faster of the two
-    /// oscillations. Two impacts within one such step of each other are missed only if
-    /// the velocity changes its sign more than once in between. The times end early
-    /// where flights become shorter than 1e-9 s, or lower than a hundred roundings of the
-    /// displacement, as before the mass comes to rest at the wall.
+    /// oscillations, in which the acceleration is taken to change its sign once at most. The times
+    /// end early where flights become shorter than 1e-9 s, or lower than a hundred roundings of
+    /// the displacement, as before the mass comes to rest at the wall.
     [[nodiscard]] std::vector<double> impacts(double t_end) const;
 
 private:
