@@ -122,6 +122,10 @@ struct StepAhead {
     double h;       ///< [s] length of the step, positive
 };
 
+// clang derives it for aggregates from its version 17 on.
+template <class X>
+StepAhead(double, const X&, const X&, double) -> StepAhead<X>;
+
 /// Computes the features of a step.
 ///
 ///     state       x[0], x[1], ...

@@ -232,6 +232,14 @@ private:
         return slope_[a];
     }
 
+    /// The value of an operand at the start; none has a negative index.
+    template <int i>
+    [[gnu::always_inline]] [[nodiscard]] S value_of() const
+    {
+        if constexpr (i >= 0) return c_[i][0];
+        return S(0.0);
+    }
+
     /// The value of an operation at the start.
     template <int i>
     [[gnu::always_inline]] void begin_op()
@@ -239,8 +247,8 @@ private:
         constexpr TapeOp op = op_at(i);
         S& out = c_[i][0];
         const S c = has_constant(op.op) ? constants_[i] : S(0.0);
-        const S a = op.a >= 0 ? c_[op.a][0] : S(0.0);
-        const S b = op.b >= 0 ? c_[op.b][0] : S(0.0);
+        const S a = value_of<op.a>();
+        const S b = value_of<op.b>();
         if constexpr (op.op == TaylorOp::constant) {
             out = c;
         } else if constexpr (op.op == TaylorOp::sum) {
