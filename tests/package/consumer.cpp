@@ -1,11 +1,13 @@
-// Code of a user of the installed package: every stepper on both main state
-// types, with the user's own warnings.
+// Code of a user of the installed package: every stepper on both main state types, and
+// a network before the detector, with the user's own warnings.
 
 #include <Eigen/Core>
 #include <array>
 #include <cstdio>
 #include <vector>
 
+#include "ricochet/detect/gates.hpp"
+#include "ricochet/nn/model.hpp"
 #include "ricochet/ricochet.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
@@ -39,13 +41,32 @@ bool with_every_stepper(const State& start)
            integrate(BouncingBall(), start, {.t_end = 1, .step = 0.01}, FixedStep<Euler>{}).t == 1;
 }
 
+/// The network always answers "event", so that every step is examined.
+bool with_networks()
+{
+    using namespace ricochet;
+    Model model;
+    model.system = "bouncing-ball";
+    model.recipe = "state";
+    model.offset = {0, 0};
+    model.scale = {1, 1};
+    model.step_min = model.step_max = 0.01;
+    model.layers = {{.inputs = 2, .outputs = 1, .weight = {0, 0}, .bias = {1}}};
+    const Options options{.t_end = 20.5, .step = 0.01};
+    const auto bounces = [&](const auto& detector) {
+        return integrate(BouncingBall(), {10.0, 0.0}, options, FixedStep<Rk4>{}, detector)
+                   .events.size() == 13;
+    };
+    return bounces(Network(model)) && bounces(Verified<>(Network(model)));
+}
+
 }  // namespace
 
 int main()
 {
     const std::array<double, 2> array = {10.0, 0.0};
     const Eigen::VectorXd vector = Eigen::Vector2d(10.0, 0.0);
-    const bool fine = with_every_stepper(array) && with_every_stepper(vector);
+    const bool fine = with_every_stepper(array) && with_every_stepper(vector) && with_networks();
     std::puts(fine ? "fine" : "wrong number of impacts");
     return fine ? 0 : 1;
 }
