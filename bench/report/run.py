@@ -170,7 +170,8 @@ class Clock:
         if n > 1:  # anew, over more than one run
             single = max(worker.ask(f"time {n}")["seconds"] / n, 1e-7)
             n = max(1, round(self.options.sample / single))
-        affordable = max(int(self.options.seconds / (n * single)), min(8, int(2 / single)))
+        # Of the slower cells more samples than the time says: three may all fall on a disturbance.
+        affordable = max(int(self.options.seconds / (n * single)), min(8, int(3 / single)))
         return n, max(3 if single < 5 else 1, min(self.options.rounds, affordable))
 
     def run(self, timed, yardstick):
