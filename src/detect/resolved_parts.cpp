@@ -51,7 +51,8 @@ void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const Guar
     }
     if (look.stays_clear(deviation) || look.keeps_shape(deviation)) return;
     if (look.size() + deviation <= declared_touch_) return;
-    if (width <= smallest) {
+    const double at = start.s + cut * width;
+    if (width <= smallest || !(at > start.s && at < end.s)) {
         // A kink keeps its shape on any part, however short.
         unresolved_ = unresolved_ || !(deviation <= 0x1p-24 * look.size());
         return;
@@ -60,7 +61,7 @@ void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const Guar
     if (depth >= shallow && !(noise_ >= 0)) noise_ = path.blur(end.s);
     if (deviation <= noise_) noise_ = path.blur(end.s);
     if (deviation <= noise_) return;
-    const GuardSample middle = path.dense_value_and_rate(start.s + cut * width);
+    const GuardSample middle = path.dense_value_and_rate(at);
     divided_ = true;
     divide(path, start, middle, smallest, depth + 1);
     // A node that cannot be distinguished from the surface is not used as the end of a part.

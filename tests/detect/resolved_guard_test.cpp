@@ -10,6 +10,7 @@
 #include "random_guards.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
+#include "ricochet/systems/coulomb_oscillator.hpp"
 
 namespace ricochet::resolved_guard_test {
 namespace {
@@ -19,6 +20,17 @@ using test::Misses;
 using test::misses_of;
 using test::Spiral;
 using X1 = std::array<double, 1>;
+
+TEST(ResolvedGuards, StepsTooShortToBeDividedEnd)
+{
+    // A fraction of the shortest number above 0 is that number or 0.
+    const double shortest = std::numeric_limits<double>::denorm_min();
+    const auto run = integrate(CoulombOscillator(), CoulombOscillator::State{2, 0},
+                               {.t_end = 100 * shortest, .step = shortest}, FixedStep<Rk4>{});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.t, 100 * shortest);
+    EXPECT_EQ(run.statistics.steps, 100U);
+}
 
 TEST(ResolvedGuards, OfThreeHundredMovingGuardsNoDipIsMissed)
 {
