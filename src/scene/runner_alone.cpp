@@ -1,5 +1,5 @@
-// A disc alone above the only wall: its impacts have a closed form, and without drag its flights,
-// too.
+// A disc or point alone above the only wall: its impacts have a closed form, and without drag its
+// flights, too.
 #include <algorithm>
 
 #include "scene/runner.hpp"
@@ -26,7 +26,7 @@ bool Runner::bounces_from_start()
     const std::uint32_t i = members_.front();
     Body& body = world_.bodies[i];
     const SceneOptions& options = world_.options;
-    if (!flies_above_one_wall(body) || body.asleep || body.radius == 0) return false;
+    if (!flies_above_one_wall(body) || body.asleep) return false;
     if (!options.sample_times.empty() || options.cancelled || options.max_events == 1) return false;
     const Face& wall = world_.faces[0];
     const double pull = dot(world_.gravity, wall.normal);

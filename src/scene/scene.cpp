@@ -350,41 +350,49 @@ std::vector<Vector2> Scene::places_at(double t) const
 void Scene::check(double t_start) const
 {
     for (std::uint32_t s = 0; s < surfaces_.size(); ++s) {
+        if (!moves(surfaces_[s].motion)) {
+            check_bodies_at(surfaces_[s], s);
+            continue;
+        }
         Surface surface = surfaces_[s];
-        if (moves(surface.motion)) {
-            check_motion_at(surface.motion, t_start, name_of(SurfaceId{s}));
-            const Vector2 moved = displacement(surface.motion, t_start);
-            for (Vector2& point : surface.points) point = point + moved;
-            const auto is_point = [](const Disc& body) { return body.radius == 0; };
-            if (!surface.is_wall && std::ranges::any_of(bodies_, is_point)) {
-                refuse(
-                    fmt::format("{} is terrain that moves, which discs alone can meet, and "
-                                "there is a point",
-                                name_of(SurfaceId{s})));
-            }
+        check_motion_at(surface.motion, t_start, name_of(SurfaceId{s}));
+        const Vector2 moved = displacement(surface.motion, t_start);
+        for (Vector2& point : surface.points) point = point + moved;
+        const auto is_point = [](const Disc& body) { return body.radius == 0; };
+        if (!surface.is_wall && std::ranges::any_of(bodies_, is_point)) {
+            refuse(
+                fmt::format("{} is terrain that moves, which discs alone can meet, and "
+                            "there is a point",
+                            name_of(SurfaceId{s})));
         }
-        double rounding = 0;
-        for (const Vector2& point : surface.points) {
-            rounding = std::max(rounding, rounding_of(point, 0));
-        }
-        for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
-            if (bodies_[i].radius > 0 && bodies_[i].radius < rounding) {
-                refuse(fmt::format(
-                    "{} is so far away that its coordinates are rounded by {:.2g} "
-                    "m, more than the radius {:g} m of {}",
-                    name_of(SurfaceId{s}), rounding, bodies_[i].radius, name_of(BodyId{i})));
-            }
-            if (!systems_.empty() && system_of(i)) continue;
-            try {
-                require_outside(bodies_[i], surface);
-            } catch (const std::invalid_argument& error) {
-                throw Misplaced(error.what(), i);
-            }
-        }
+        check_bodies_at(surface, s);
     }
     const std::vector<Vector2> places =
         systems_.empty() ? std::vector<Vector2>{} : places_at(t_start);
     require_apart(*this, places);
+}
+
+/// Checks all bodies beside a surface, where it is at the start.
+void Scene::check_bodies_at(const Surface& surface, std::uint32_t index) const
+{
+    double rounding = 0;
+    for (const Vector2& point : surface.points) {
+        rounding = std::max(rounding, rounding_of(point, 0));
+    }
+    for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+        if (bodies_[i].radius > 0 && bodies_[i].radius < rounding) {
+            refuse(fmt::format(
+                "{} is so far away that its coordinates are rounded by {:.2g} "
+                "m, more than the radius {:g} m of {}",
+                name_of(SurfaceId{index}), rounding, bodies_[i].radius, name_of(BodyId{i})));
+        }
+        if (!systems_.empty() && system_of(i)) continue;
+        try {
+            require_outside(bodies_[i], surface);
+        } catch (const std::invalid_argument& error) {
+            throw Misplaced(error.what(), i);
+        }
+    }
 }
 
 }  // namespace ricochet

@@ -59,6 +59,7 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
     const auto groups = groups_of(world);
     run.samples.resize(world.options.sample_times.size());
     for (auto& row : run.samples) row.resize(world.bodies.size());
+    if (world.options.record_events) run.events.reserve(16);
     Runner runner(world, t_end);
     for (std::size_t number = 0; number < groups.size(); ++number) {
         const auto group = groups[number];

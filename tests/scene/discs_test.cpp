@@ -192,8 +192,8 @@ TEST(Discs, BallsThatMeetNoneBounceAsEachDoesByItself)
 TEST(Discs, ABallAloneBouncesFromTheStartAsAfterASearch)
 {
     // A sample at the start makes the run search for the first impact; otherwise it is computed
-    // directly. The cases are inclined, slow, inelastic, with friction, and beginning at a late
-    // time.
+    // directly. The cases are discs and points, inclined, slow, inelastic, with friction, and
+    // beginning at a late time.
     std::mt19937_64 random(7);
     const auto any = [&](double low, double high) {
         return std::uniform_real_distribution<double>(low, high)(random);
@@ -209,12 +209,20 @@ TEST(Discs, ABallAloneBouncesFromTheStartAsAfterASearch)
                             .friction = k % 4 == 0 ? 0.3 : 0});
         const Vector2 normal{std::sin(incline), std::cos(incline)};
         scene.wall({.normal = normal, .material = material});
-        const double height = 0.25 + (k % 7 == 0 ? 1e-12 : any(0, 3));
-        scene.disc({.at = {height * normal[0], height * normal[1]},
-                    .velocity = {k % 2 == 0 ? 0 : any(-2, 2), any(-2, 2)},
-                    .radius = 0.25,
-                    .mass = any(0.5, 2),
-                    .material = material});
+        const double radius = k % 8 < 4 ? 0.25 : 0;
+        const double height = radius + (k % 7 == 0 ? 1e-12 : any(0, 3));
+        const Vector2 at{height * normal[0], height * normal[1]};
+        const Vector2 velocity{k % 2 == 0 ? 0 : any(-2, 2), any(-2, 2)};
+        const double mass = any(0.5, 2);
+        if (radius > 0) {
+            scene.disc({.at = at,
+                        .velocity = velocity,
+                        .radius = radius,
+                        .mass = mass,
+                        .material = material});
+        } else {
+            scene.point({.at = at, .velocity = velocity, .mass = mass, .material = material});
+        }
         SceneOptions options{.t_start = k % 6 == 0 ? any(-1e3, 1e3) : 0};
         options.t_end = options.t_start + any(0.5, 5);
         const SceneRun direct = simulate(scene, options);

@@ -234,6 +234,7 @@ private:
     /// Centres of all bodies at t [s]: those of systems move with the time, too.
     [[nodiscard]] std::vector<Vector2> places_at(double t) const;
     void require_outside(const Disc& body, const Surface& surface) const;
+    void check_bodies_at(const Surface& surface, std::uint32_t index) const;
 
     Settings settings_;
     std::vector<Material> materials_;
