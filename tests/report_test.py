@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
 """What scripts/bench does with answers and with peers that misbehave; no peer is needed."""
+import argparse
+import contextlib
+import io
 import json
 import sys
 import tempfile
@@ -97,6 +100,64 @@ class Peers(unittest.TestCase):
         self.assertIsNone(worker)
         self.assertIn("signal 6", row["failed"])
         self.assertEqual(page.why(row), row["failed"])
+
+
+FAKE = """#!{python}
+import json, sys
+with open({log!r}, "a") as log:
+    print("started", file=log)
+for line in sys.stdin:
+    if line.startswith("solve"):
+        print(json.dumps({{"finished": True, "times": [1.0, 2.0, 3.0], "guards": [0, 0, 1],
+                          "samples": [], "steps": 3, "flow_calls": 4, "guard_calls": 5,
+                          "energy_change": None, "note": ""}}), flush=True)
+    else:
+        print(json.dumps({{"seconds": {seconds} * int(line.split()[1])}}), flush=True)
+"""
+
+
+class Passes(unittest.TestCase):
+    def setUp(self):
+        self.place = tempfile.TemporaryDirectory()
+        self.directory = Path(self.place.name)
+        self.log = self.directory / "log"
+        self.program = run.PROGRAM
+        self.options = argparse.Namespace(sample=0.01, seconds=0.2, rounds=15, core=None)
+        self.problem = EVENTS | {"problem": "p", "t_end": 4, "scored_until": None,
+                                 "sample_times": []}
+
+    def tearDown(self):
+        run.PROGRAM = self.program
+        self.place.cleanup()
+
+    def cell(self, seconds):
+        script = self.directory / "peer"
+        script.write_text(FAKE.format(python=sys.executable, log=str(self.log), seconds=seconds))
+        script.chmod(0o755)
+        run.PROGRAM = str(script)
+        return {"name": "p/x/y", "problem": "p", "peer": "x", "how": "y", "value": 0,
+                "command": [str(script), "serve", "p/x/y"]}
+
+    def passes(self, cell, numbers):
+        clock = run.Clock(self.options)
+        with contextlib.redirect_stdout(io.StringIO()):
+            for done in numbers:
+                rows = run.run_problem(self.problem, [cell], done, self.options, clock,
+                                       self.directory)
+        return rows[0]
+
+    def test_each_pass_takes_its_part_of_the_samples_in_a_process_of_its_own(self):
+        cell = self.cell(0.01)
+        self.assertEqual(len(self.passes(cell, [0])["samples"]), 8)
+        row = self.passes(cell, [0, 1])  # goes on from the file of the first pass
+        self.assertEqual([len(row["samples"]), row["passes"]], [15, 2])
+        self.assertEqual(self.log.read_text().count("started"), 4)  # with the yardstick's
+        self.passes(cell, [0, 1])
+        self.assertEqual(self.log.read_text().count("started"), 4)
+
+    def test_a_single_sample_is_taken_once(self):
+        row = self.passes(self.cell(6), [0, 1])
+        self.assertEqual([row["samples"], row["passes"]], [[6.0], 1])
 
 
 def report(times, yardstick):

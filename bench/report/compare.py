@@ -39,7 +39,7 @@ def agreement(report, older):
         if len(names) < 2:
             continue
         shift = statistics.fmean(math.log(new[name] / old[name]) for name in names)
-        departures += [(abs(math.expm1(math.log(new[name] / old[name]) - shift)), name)
+        departures += [(math.expm1(abs(math.log(new[name] / old[name]) - shift)), name)
                        for name in names]
     return sorted(departures, reverse=True)
 

@@ -1,11 +1,12 @@
 #!/usr/bin/env python3
 """Solves, scores and times the cells of the report, and writes it; see scripts/bench.
 
-Every cell (problem, peer, setting) runs in a process of its own, pinned to one core, which solves
-and repeats on request. An answer is scored before it is timed; the cells of a problem are timed in
-turns, in blocks of random order, so that what the machine does meanwhile falls on all alike. Each
-cell leaves a JSON file, and a report that was interrupted goes on where it ended. The files are
-kept apart by a hash of the programs, so that another build starts anew.
+Every cell (problem, peer, setting) runs in processes of its own, pinned to one core, which solve
+and repeat on request. An answer is scored before it is timed; the cells of a problem are timed in
+turns, in blocks of random order, so that what the machine does meanwhile falls on all alike. A
+second pass over all problems takes the other half of the samples, minutes later and in other
+processes. Each cell leaves a JSON file, and a report that was interrupted goes on where it ended.
+The files are kept apart by a hash of the programs, so that another build starts anew.
 """
 import argparse
 import hashlib
@@ -35,6 +36,7 @@ PACKAGES = {"CVODE": "libsundials-dev", "ARKODE": "libsundials-dev", "GSL": "lib
             "ODE": "libode-dev", "Bullet": "libbullet-dev", "SciPy": "python3-scipy",
             "Siconos": "python3-siconos"}
 PATIENCE = 20  # [s] for one answer
+PASSES = 2  # what slows some cells for minutes, or the memory of one process, does not meet both
 
 
 class PeerFailed(Exception):
@@ -128,7 +130,7 @@ def repeat_command(cell, core):
 
 def row_of(cell, core):
     row = {name: cell[name] for name in ("name", "problem", "peer", "how", "value")}
-    return row | {"command": repeat_command(cell, core), "samples": []}
+    return row | {"command": repeat_command(cell, core), "samples": [], "passes": 0}
 
 
 def unasked(cell, core):
@@ -163,9 +165,10 @@ class Clock:
         self.yardstick = []
 
     def repetitions(self, worker):
-        """How often it runs in a sample, and how many samples are affordable."""
-        worker.ask("time 1")
-        single = max(worker.ask("time 1")["seconds"], 1e-7)
+        """How often it runs in a sample, and how many samples are affordable in all passes."""
+        single = worker.ask("time 1")["seconds"]
+        if single < 1:  # anew, since the first run may have been slow
+            single = max(worker.ask("time 1")["seconds"], 1e-7)
         n = max(1, round(self.options.sample / single))
         if n > 1:  # anew, over more than one run
             single = max(worker.ask(f"time {n}")["seconds"] / n, 1e-7)
@@ -179,68 +182,93 @@ class Clock:
         plans = []
         for row, worker in timed:
             try:
-                plans.append((row, worker, *self.repetitions(worker)))
+                if "rounds" in row:
+                    worker.ask("time 1")
+                else:
+                    row["runs"], row["rounds"] = self.repetitions(worker)
+                plans.append((row, worker, share(row)))
             except PeerFailed as failure:
                 row["failed"] = str(failure)
-        turns = max((plan[3] for plan in plans), default=0)
+        turns = max((plan[2] for plan in plans), default=0)
         for turn in range(turns):
             self.random.shuffle(plans)
             self.yardstick.append(yardstick.ask("time 20")["seconds"] / 20 / 100000)
-            for row, worker, n, rounds in plans:
+            for row, worker, rounds in plans:
                 # Few samples are spread over all turns, so that one disturbance does not meet all.
                 if turn * rounds % turns >= rounds or "failed" in row:
                     continue
                 try:
-                    row["samples"].append(worker.ask(f"time {n}")["seconds"] / n)
+                    runs = row["runs"]
+                    row["samples"].append(worker.ask(f"time {runs}")["seconds"] / runs)
                 except PeerFailed as failure:
                     row["failed"] = str(failure)
             print(".", end="", flush=True)
+
+
+def share(row):
+    """Samples of a cell in its next pass; those of all passes are `rounds`."""
+    def until(passes):
+        return -(-row["rounds"] * passes // PASSES)
+    return until(row["passes"] + 1) - until(row["passes"])
 
 
 def file_of(directory, name):
     return directory / (re.sub(r"[^A-Za-z0-9.+-]", "_", name) + ".json")
 
 
-def run_problem(problem, cells, options, clock, directory):
-    """Rows of one problem; what is stored is not run again."""
+def solved(cells, problem, options):
+    """Rows of cells and their workers, where they may be timed."""
+    out = []
+    mute = set()  # ways that have given no answer; the other settings would cost as much
+    for cell in cells:
+        way = (cell["peer"], cell["how"])
+        if way in mute:
+            row, worker = unasked(cell, options.core), None
+        else:
+            row, worker = solve(cell, problem, options.core)
+        if "no answer" in row.get("failed", ""):
+            mute.add(way)
+        out.append((row, worker))
+    return out
+
+
+def run_problem(problem, cells, done, options, clock, directory):
+    """Rows of one problem after `done` + 1 passes; what is stored is not run again."""
     rows, todo = [], []
     for cell in cells:
         file = file_of(directory, cell["name"])
-        if file.exists() and not options.fresh:
-            rows.append(json.loads(file.read_text()))
+        row = json.loads(file.read_text()) if file.exists() else row_of(cell, options.core)
+        if row["passes"] > done or "failed" in row:
+            rows.append(row)
+        elif done > 0 and ("rounds" not in row or share(row) == 0):
+            rows.append(row)
         else:
-            todo.append(cell)
+            todo.append((cell, row))
     if not todo:
         return rows
     began = time.monotonic()
     print(f"{problem['problem']}: {len(todo)} cells ", end="", flush=True)
     yardstick = Worker([PROGRAM, "serve", "yardstick/odeint/rk4"], options.core)
-    new, timed = [], []
+    pairs = []
     try:
-        mute = set()  # ways that have given no answer; the other settings would cost as much
-        for cell in todo:
-            way = (cell["peer"], cell["how"])
-            if way in mute:
-                row, worker = unasked(cell, options.core), None
-            else:
-                row, worker = solve(cell, problem, options.core)
-            if "no answer" in row.get("failed", ""):
-                mute.add(way)
-            new.append(row)
-            if worker:
-                timed.append((row, worker))
-        clock.run(timed, yardstick)
+        if done == 0:
+            pairs = solved([cell for cell, _ in todo], problem, options)
+        else:
+            pairs = [(row, Worker(cell["command"], options.core)) for cell, row in todo]
+        clock.run([(row, worker) for row, worker in pairs if worker], yardstick)
     finally:
         yardstick.close()
-        for _, worker in timed:
-            worker.close()
-    for row in new:
+        for _, worker in pairs:
+            if worker:
+                worker.close()
+    for row, _ in pairs:
+        row["passes"] = done + 1
         file = file_of(directory, row["name"])
         part = file.with_suffix(".part")
         part.write_text(json.dumps(row))
         part.rename(file)
     print(f" {time.monotonic() - began:.0f} s", flush=True)
-    return rows + new
+    return rows + [row for row, _ in pairs]
 
 
 def pays():
@@ -334,23 +362,25 @@ def arguments():
 def main():
     options = arguments()
     problems, cells, versions, absent = listing()
-    programs = [ROOT / PROGRAM, *sorted(HERE.glob("*_peer.py"))]
+    programs = [ROOT / PROGRAM, Path(__file__), *sorted(HERE.glob("*_peer.py"))]
     directory = ROOT / "build/bench/cells" / key_of(programs)
     directory.mkdir(parents=True, exist_ok=True)
     began = time.monotonic()
     clock = Clock(options)
     spread_file = directory / "yardstick.txt"
+    chosen = {name: [cell for cell in cells if cell["problem"] == name]
+              for name in problems if options.only in name}
     if options.fresh:
         spread_file.unlink(missing_ok=True)
-    rows = []
-    for name, problem in problems.items():
-        if options.only not in name:
-            continue
-        rows += run_problem(problem, [cell for cell in cells if cell["problem"] == name], options,
-                            clock, directory)
-        with spread_file.open("a") as file:
-            file.writelines(f"{seconds}\n" for seconds in clock.yardstick)
-        clock.yardstick = []
+        for cell in (cell for of in chosen.values() for cell in of):
+            file_of(directory, cell["name"]).unlink(missing_ok=True)
+    for done in range(PASSES):
+        rows = []
+        for name, of in chosen.items():
+            rows += run_problem(problems[name], of, done, options, clock, directory)
+            with spread_file.open("a") as file:
+                file.writelines(f"{seconds}\n" for seconds in clock.yardstick)
+            clock.yardstick = []
     yardstick = ([float(line) for line in spread_file.read_text().split()]
                  if spread_file.exists() else [])
     report = {"machine": machine(), "versions": versions, "absent": absent, "rows": rows,

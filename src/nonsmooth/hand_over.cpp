@@ -1,5 +1,7 @@
 #include "ricochet/nonsmooth/hand_over.hpp"
 
+#include <fmt/format.h>
+
 #include "../checks/require.hpp"
 
 namespace ricochet {
@@ -45,6 +47,24 @@ HandOverOptions hand_over_options(const Options& options)
 }
 
 namespace detail {
+
+HandOverOptions inclusion_options(const Options& options)
+{
+    const Options unset{};
+    const auto unused = [](bool given, std::string_view name) {
+        if (given) {
+            Refuse{"integrate"}(fmt::format("a run of an inclusion alone has no {}", name));
+        }
+    };
+    unused(options.mode != unset.mode, "mode");
+    unused(options.step != unset.step, "step");
+    unused(options.h_min != unset.h_min, "h_min");
+    unused(options.event_rtol != unset.event_rtol, "event_rtol");
+    unused(options.event_window != unset.event_window, "event_window");
+    unused(options.check_inside != unset.check_inside, "check_inside");
+    unused(options.stall_steps != unset.stall_steps, "stall_steps");
+    return hand_over_options(options);
+}
 
 HandOverOptions completed(HandOverOptions options, bool locate)
 {

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "ricochet/nonsmooth/hand_over.hpp"
@@ -415,6 +417,32 @@ TEST(EventHandOver, RefusesWhatAHandOverDoesNotHave)
                  std::invalid_argument);
     EXPECT_THROW((void)integrate(belt, x0, {.t_end = -1}), std::invalid_argument);
     EXPECT_THROW((void)integrate(belt, x0, {.t_end = 1, .rtol = -1}), std::invalid_argument);
+}
+
+TEST(EventHandOver, RefusesOptionsThatARunOfAnInclusionAloneDoesNotUse)
+{
+    const SlidingMode inclusion;
+    const auto start = StateOf<SlidingMode>::Constant(1).eval();
+    const Options fine{.t_end = 1};
+    EXPECT_EQ(integrate(inclusion, start, fine).outcome, Outcome::reached_end);
+    const auto refused = [&](const auto& change, const std::string& name) {
+        Options options = fine;
+        change(options);
+        try {
+            (void)integrate(inclusion, start, options);
+            ADD_FAILURE() << name;
+        } catch (const std::invalid_argument& error) {
+            EXPECT_NE(std::string(error.what()).find(" no " + name), std::string::npos)
+                << error.what();
+        }
+    };
+    refused([](Options& o) { o.mode = 1; }, "mode");
+    refused([](Options& o) { o.step = 0.1; }, "step");
+    refused([](Options& o) { o.h_min = 1e-9; }, "h_min");
+    refused([](Options& o) { o.event_rtol = 1e-9; }, "event_rtol");
+    refused([](Options& o) { o.event_window = 1e-9; }, "event_window");
+    refused([](Options& o) { o.check_inside = false; }, "check_inside");
+    refused([](Options& o) { o.stall_steps = 10; }, "stall_steps");
 }
 
 }  // namespace

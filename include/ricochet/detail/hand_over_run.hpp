@@ -103,4 +103,12 @@ struct HandOverRun : detail::AnyHandOverRun<state_size<System>, reaction_size<Sy
 /// `record_steps`, a run backward.
 [[nodiscard]] HandOverOptions hand_over_options(const Options& options);
 
+namespace detail {
+
+/// The same for a run of an inclusion alone.
+/// @throws std::invalid_argument also for options that it does not use
+[[nodiscard]] HandOverOptions inclusion_options(const Options& options);
+
+}  // namespace detail
+
 }  // namespace ricochet

@@ -482,12 +482,15 @@ requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
 }
 
 /// Runs an inclusion alone: `hand_over`.
+///
+/// @throws std::invalid_argument as above, and for options that it does not use: `mode`, `step`,
+///         `h_min`, `event_rtol`, `event_window`, `check_inside`, `stall_steps`.
 template <class System, class X, class Stepping = ErrorControlled<Dopri5>>
 requires NotIntegrable<System, X> && Inclusion<System>
 [[nodiscard]] HandOverRun<System> integrate(const System& system, const X& w0,
                                             const Options& options, const Stepping& stepping = {})
 {
-    auto run = hand_over(system, StateOf<System>(w0), hand_over_options(options), stepping);
+    auto run = hand_over(system, StateOf<System>(w0), detail::inclusion_options(options), stepping);
     if (!options.record_events) run.events.clear();
     return run;
 }
