@@ -164,9 +164,12 @@ class Clock:
         self.random = random.Random(1)
         self.yardstick = []
 
-    def repetitions(self, worker):
-        """How often it runs in a sample, and how many samples are affordable in all passes."""
+    def repetitions(self, row, worker):
+        """How often it runs in a sample, and how many more samples are affordable in all passes."""
         single = worker.ask("time 1")["seconds"]
+        if single >= 5:
+            row["samples"].append(single)
+            return 1, 0
         if single < 1:  # anew, since the first run may have been slow
             single = max(worker.ask("time 1")["seconds"], 1e-7)
         n = max(1, round(self.options.sample / single))
@@ -175,7 +178,7 @@ class Clock:
             n = max(1, round(self.options.sample / single))
         # Of the slower cells more samples than the time says: three may all fall on a disturbance.
         affordable = max(int(self.options.seconds / (n * single)), min(8, int(3 / single)))
-        return n, max(3 if single < 5 else 1, min(self.options.rounds, affordable))
+        return n, max(3, min(self.options.rounds, affordable))
 
     def run(self, timed, yardstick):
         """`timed` are pairs of row and worker; the samples are appended to the rows."""
@@ -185,7 +188,7 @@ class Clock:
                 if "rounds" in row:
                     worker.ask("time 1")
                 else:
-                    row["runs"], row["rounds"] = self.repetitions(worker)
+                    row["runs"], row["rounds"] = self.repetitions(row, worker)
                 plans.append((row, worker, share(row)))
             except PeerFailed as failure:
                 row["failed"] = str(failure)
