@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "report/gas.hpp"
 #include "report/problems.hpp"
 #include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/extremum.hpp"
@@ -22,6 +23,7 @@
 #include "ricochet/integrate/methods.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/scene/simulate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/thermostat.hpp"
@@ -99,6 +101,24 @@ Path saved_and_restored()
     };
 }
 
+Path simulated(const Scene& scene, double t_end)
+{
+    return [=] {
+        auto result = simulate(scene, {.t_end = t_end});
+        keep(result);
+    };
+}
+
+Path ball_as_scene()
+{
+    const auto task = report::ball();
+    Scene scene({.gravity = {0, -9.81}});
+    const MaterialId rubber = scene.material({.restitution = 0.9});
+    scene.wall({.normal = {0, 1}, .material = rubber});
+    scene.point({.at = {0, task.x0[0]}, .material = rubber});
+    return simulated(scene, task.t_end);
+}
+
 Path by_network()
 {
     const Network network(load_model(RICOCHET_MODELS "/bouncing-ball-step-0.01.safetensors"));
@@ -160,6 +180,9 @@ const std::vector<Named>& paths()
         {"10 balls in a vector", [] { return run(report::balls(10), loose); }},
         {"100 balls in a vector", [] { return run(report::balls(100), loose); }},
         {"diode circuit, hand-over", circuit},
+        {"ball as a scene", ball_as_scene},
+        {"100 discs as a scene",
+         [] { return simulated(report::gas_scene(100), report::gas_end(100)); }},
     };
     return all;
 }
