@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "report/ball_scene.hpp"
 #include "report/gas.hpp"
 #include "report/problems.hpp"
 #include "ricochet/detect/bernstein.hpp"
@@ -112,11 +113,7 @@ Path simulated(const Scene& scene, double t_end)
 Path ball_as_scene()
 {
     const auto task = report::ball();
-    Scene scene({.gravity = {0, -9.81}});
-    const MaterialId rubber = scene.material({.restitution = 0.9});
-    scene.wall({.normal = {0, 1}, .material = rubber});
-    scene.point({.at = {0, task.x0[0]}, .material = rubber});
-    return simulated(scene, task.t_end);
+    return simulated(report::scene_of(task), task.t_end);
 }
 
 Path by_network()

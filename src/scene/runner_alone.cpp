@@ -18,7 +18,7 @@ bool Runner::flies_above_one_wall(const Body& body) const
     return dot(body.v, along) == 0 && dot(world_.gravity, along) == 0;
 }
 
-/// Takes a disc from the start through its first impact and the bounces after it, with the
+/// Takes a body from the start through its first impact and the bounces after it, with the
 /// arithmetic of `impact` but without a search for contacts. Returns false, with nothing changed,
 /// where anything else may happen.
 bool Runner::bounces_from_start()
