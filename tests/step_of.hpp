@@ -14,20 +14,20 @@ struct DoorOf {
     detail::StepperDoor<System, X, Method> door;
 };
 
-/// For states that the loop uses without conversion.
+/// Its states are those of the loop.
 template <class Method, class System, class X>
-class StepOf : DoorOf<Method, System, X>, public detail::Step<X> {
-    static_assert(std::is_same_v<X, detail::CoreState<X>>);
+class StepOf : DoorOf<Method, System, X>, public detail::Step<detail::CoreState<X>> {
+    using Step = detail::Step<detail::CoreState<X>>;
     using At = DoorOf<Method, System, X>;
     static constexpr double infinity = std::numeric_limits<double>::infinity();
 
 public:
     StepOf(const System& system, double t, const X& x, Mode mode = 0, bool backward = false)
         : At{{system, x}},
-          detail::Step<X>({detail::system_table<System, X>,
-                           static_cast<detail::Door<System, X>*>(&this->At::door)},
-                          detail::kernel_for<System, X>(Method{}), x,
-                          {.t_start = t, .t_end = backward ? -infinity : infinity, .mode = mode})
+          Step({detail::system_table<System, X>,
+                static_cast<detail::Door<System, X>*>(&this->At::door)},
+               detail::kernel_for<System, X>(Method{}), detail::core_state(x),
+               {.t_start = t, .t_end = backward ? -infinity : infinity, .mode = mode})
     {
     }
 };

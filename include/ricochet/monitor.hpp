@@ -17,6 +17,7 @@
 // first set of events, its resets, the arming of all guards with the flow after them.
 #pragma once
 
+#include <array>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
@@ -25,7 +26,9 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "ricochet/detail/declarations.hpp"
 #include "ricochet/detail/finders.hpp"
@@ -228,7 +231,9 @@ class EventMonitor {
 
 public:
     /// Type of the states of `cut` and `events`: contiguous doubles.
-    using State = detail::CoreState<X>;
+    using State =
+        std::conditional_t<detail::is_small<detail::CoreState<X>>,
+                           std::array<double, detail::fixed_size<X>()>, std::vector<double>>;
 
     /// Keeps a reference to the system.
     /// @param like  a state of the dimension of the motion
@@ -237,8 +242,8 @@ public:
     explicit EventMonitor(const System& system, const X& like, const MonitorOptions& options = {},
                           const Detector& detector = {}, const Locator& locator = {})
         : parts_(std::make_unique<Parts>(system, like, detector, locator)),
-          monitor_(detail::make_monitor<State>(parts_->setup(), detail::core_state(like),
-                                               engine_options(options), options.cut_at_all)),
+          monitor_(detail::make_monitor<Core>(parts_->setup(), detail::core_state(like),
+                                              engine_options(options), options.cut_at_all)),
           room_(detail::core_state(like))
     {
     }
@@ -313,7 +318,26 @@ public:
     /// a cut at a time event.
     [[nodiscard]] Verdict hold(double t) { return monitor_->hold(t); }
 
-    [[nodiscard]] const Cut<State>& cut() const noexcept { return monitor_->cut(); }
+    [[nodiscard]] const Cut<State>& cut() const
+    {
+        if constexpr (same) {
+            return monitor_->cut();
+        } else {
+            const Cut<Core>& from = monitor_->cut();
+            Cut<State>& cut = shown_.cut;
+            cut.s = from.s;
+            cut.t = from.t;
+            cut.before = detail::as_callers(from.before, State{});
+            cut.after = detail::as_callers(from.after, State{});
+            cut.mode_before = from.mode_before;
+            cut.mode_after = from.mode_after;
+            cut.fired = from.fired;  // into the memory that it has
+            cut.on_time = from.on_time;
+            cut.accumulation = from.accumulation;
+            cut.state_changed = from.state_changed;
+            return cut;
+        }
+    }
 
     /// Time [s] at which the next step begins.
     [[nodiscard]] Instant t() const noexcept { return monitor_->t(); }  ///< [s]
@@ -348,19 +372,45 @@ public:
         return monitor_->run().statistics;
     }
     /// Events since `clear_events`, in the order in which they happened.
-    [[nodiscard]] std::span<const Event<State>> events() const noexcept
+    [[nodiscard]] std::span<const Event<State>> events() const
     {
-        return monitor_->run().events;
+        const auto& events = monitor_->run().events;
+        if constexpr (same) {
+            return events;
+        } else {
+            for (std::size_t i = shown_.events.size(); i < events.size(); ++i) {
+                shown_.events.push_back(detail::as_callers(events[i], State{}));
+            }
+            return shown_.events;
+        }
     }
-    void clear_events() noexcept { monitor_->clear_events(); }
+    void clear_events() noexcept
+    {
+        shown_.events.clear();
+        monitor_->clear_events();
+    }
 
     /// State of the monitor between two steps, on which its future depends.
     [[nodiscard]] Snapshot save() const { return monitor_->save(); }
     /// @throws std::invalid_argument if the snapshot is of another system, or does not hold a valid
     /// state; then nothing has changed.
-    void restore(const Snapshot& snapshot) { monitor_->restore(snapshot); }
+    void restore(const Snapshot& snapshot)
+    {
+        monitor_->restore(snapshot);
+        shown_.events.clear();
+    }
 
 private:
+    /// Type of the states of the engine.
+    using Core = detail::CoreState<X>;
+    static constexpr bool same = std::is_same_v<State, Core>;
+
+    /// What `cut` and `events` return where the states of the engine are of another type.
+    struct Shown {
+        Cut<State> cut;
+        std::vector<Event<State>> events;
+    };
+
     class Parts {
     public:
         Parts(const System& system, const X& like, const Detector& detector, const Locator& locator)
@@ -371,7 +421,7 @@ private:
         Parts(const Parts&) = delete;
         Parts& operator=(const Parts&) = delete;
 
-        [[nodiscard]] detail::RunSetup<State> setup() noexcept
+        [[nodiscard]] detail::RunSetup<Core> setup() noexcept
         {
             return {.system = &table,
                     .door = &door_,
@@ -383,14 +433,14 @@ private:
 
     private:
         /// Guards see whole states, because a host's interpolant need not be a polynomial.
-        [[nodiscard]] static constexpr detail::SystemTable<State> of_whole_states() noexcept
+        [[nodiscard]] static constexpr detail::SystemTable<Core> of_whole_states() noexcept
         {
-            detail::SystemTable<State> table = detail::system_table<System, X>;
+            detail::SystemTable<Core> table = detail::system_table<System, X>;
             table.guard_on = nullptr;
             table.rate_on = nullptr;
             return table;
         }
-        static constexpr detail::SystemTable<State> table = of_whole_states();
+        static constexpr detail::SystemTable<Core> table = of_whole_states();
 
         detail::Door<System, X> door_;
         Detector detector_;
@@ -431,7 +481,7 @@ private:
 
     [[nodiscard]] std::size_t dimension() const noexcept
     {
-        if constexpr (detail::fixed_size<State>() > 0) return room_.size();
+        if constexpr (detail::is_small<Core>) return room_.size();
         return monitor_->x().size();
     }
 
@@ -441,16 +491,17 @@ private:
         return x.data();
     }
 
-    [[nodiscard]] const State& taken(std::span<const double> x)
+    [[nodiscard]] const Core& taken(std::span<const double> x)
     {
-        if constexpr (detail::fixed_size<State>() > 0) (void)checked(x, room_.size());
+        if constexpr (detail::is_small<Core>) (void)checked(x, room_.size());
         detail::copy_state(x, room_);
         return room_;
     }
 
     std::unique_ptr<Parts> parts_;
-    std::unique_ptr<detail::AnyMonitor<State>> monitor_;
-    State room_;
+    std::unique_ptr<detail::AnyMonitor<Core>> monitor_;
+    Core room_;
+    mutable Shown shown_;
 };
 
 }  // namespace ricochet

@@ -99,11 +99,9 @@ concept JacobianMisfits = !JacobianWritten<System, X> && requires
     &System::jacobian;
 };
 
-/// Storage for an n x n matrix, of fixed size or sized at run time like C.
-template <class C>
-using MatrixLike =
-    std::conditional_t<(fixed_size<C>() > 0), std::array<double, fixed_size<C>() * fixed_size<C>()>,
-                       std::vector<double>>;
+/// `count` numbers; 0: sized at run time.
+template <class T, std::size_t count>
+using Numbers = std::conditional_t<(count > 0), std::array<T, count>, std::vector<T>>;
 
 /// Factorizes A = L U in place, with row exchanges. False: A is singular or not finite.
 [[nodiscard]] inline bool factorize(std::size_t n, double* a, std::size_t* rows) noexcept
@@ -140,19 +138,19 @@ void substitute(std::size_t n, const double* a, const std::size_t* rows, C& b) n
     }
 }
 
-/// Work space of Rosenbrock's method between calls.
-template <class C>
+/// Work space of Rosenbrock's method between calls, for n components; 0: as many as a vector has.
+template <class C, std::size_t n>
 struct RosenbrockRoom {
     explicit RosenbrockRoom(const C& like)
         : x(like), rate(like), by_time(like), at(like), flow(like), increment(like), error(like)
     {
         stages.fill(like);
-        if constexpr (fixed_size<C>() == 0) {
-            const std::size_t n = like.size();
-            jacobian.resize(n * n);
-            factors.resize(n * n);
-            rows.resize(n);
-            series.resize(4 * n);
+        if constexpr (n == 0) {
+            const std::size_t size = like.size();
+            jacobian.resize(size * size);
+            factors.resize(size * size);
+            rows.resize(size);
+            series.resize(4 * size);
         }
     }
 
@@ -162,20 +160,16 @@ struct RosenbrockRoom {
     bool backward = false;
     bool known = false;
     C x, rate, by_time;  ///< f and df/ds
-    MatrixLike<C> jacobian{};
+    Numbers<double, n * n> jacobian{};
 
     // One step from that start.
     C at, flow, increment, error;
     std::array<C, 5> stages;
-    MatrixLike<C> factors{};
-    std::conditional_t<(fixed_size<C>() > 0), std::array<std::size_t, fixed_size<C>()>,
-                       std::vector<std::size_t>>
-        rows{};
+    Numbers<double, n * n> factors{};
+    Numbers<std::size_t, n> rows{};
 
     // The current step: its interpolant as a power series, and its length.
-    std::conditional_t<(fixed_size<C>() > 0), std::array<double, 4 * fixed_size<C>()>,
-                       std::vector<double>>
-        series{};
+    Numbers<double, 4 * n> series{};
     double h = std::numeric_limits<double>::quiet_NaN();
 };
 
@@ -191,7 +185,9 @@ struct StepperDoor<System, X, Rosenbrock4> : Door<System, X> {
         : Door<System, X>(system, like), room(core_state(like))
     {
     }
-    RosenbrockRoom<CoreState<X>> room;
+    using Room =
+        RosenbrockRoom<CoreState<X>, fixed_size<CoreState<X>>() == 0 ? 0 : fixed_size<X>()>;
+    Room room;
 };
 
 template <class System, class X>
@@ -199,10 +195,21 @@ class KernelOf<System, X, Rosenbrock4> {
     using C = CoreState<X>;
     using State = StepState<C>;
     using D = StepperDoor<System, X, Rosenbrock4>;
-    using Room = RosenbrockRoom<C>;
+    using Room = typename D::Room;
     using Table = RodasTableau;
 
     static constexpr bool by_duals = flow_takes_duals<System, X>;
+
+    /// Calls `function(i)` for every component, without the zeros behind those of a small state.
+    template <class Function>
+    [[gnu::always_inline]] static void for_components(const C& x, const Function& function)
+    {
+        if constexpr (is_small<C>) {
+            for_each_index<fixed_size<X>()>(function);
+        } else {
+            for_each_component(x, function);
+        }
+    }
 
     [[nodiscard]] static D& at(void* door) noexcept
     {
@@ -215,7 +222,7 @@ class KernelOf<System, X, Rosenbrock4> {
         ++state.flow_calls;
         state.flow_fits &= door.flow(state.mode, state.time(s), x, rate);
         if (state.backward) {
-            for_each_component(x, [&](auto i) { rate[i] = -rate[i]; });
+            for_components(x, [&](auto i) { rate[i] = -rate[i]; });
         }
     }
 
@@ -284,8 +291,8 @@ class KernelOf<System, X, Rosenbrock4> {
         const double later = state.start.plus(state.in_time(reach_of(state.start.value)));
         const double delta = state.in_time(later - state.start.value);
         flow(door, state, delta, state.x0, room.flow);
-        for_each_component(
-            state.x0, [&](auto i) { room.by_time[i] = (room.flow[i] - room.rate[i]) / delta; });
+        for_components(state.x0,
+                       [&](auto i) { room.by_time[i] = (room.flow[i] - room.rate[i]) / delta; });
     }
 
     /// Length of a difference at x, which changes x however large it is.
@@ -304,7 +311,7 @@ class KernelOf<System, X, Rosenbrock4> {
                     room.start.remainder == state.start.remainder && room.mode == state.mode &&
                     room.backward == state.backward && room.x.size() == state.x0.size();
         if (same)
-            for_each_component(state.x0, [&](auto i) { same = same && room.x[i] == state.x0[i]; });
+            for_components(state.x0, [&](auto i) { same = same && room.x[i] == state.x0[i]; });
         if (same) return;
         if (room.x.size() != state.x0.size()) room = Room(state.x0);
         room.known = false;  // stays so if the flow throws
@@ -359,7 +366,7 @@ class KernelOf<System, X, Rosenbrock4> {
         flow(door, state, h, room.at, room.error);
         for (std::size_t j = 0; j < 5; ++j) add(room.error, Table::m[5][j] / h, room.stages[j]);
         substitute(n, room.factors.data(), room.rows.data(), room.error);
-        for_each_component(state.x0, [&](auto i) {
+        for_components(state.x0, [&](auto i) {
             double sum = room.error[i] + room.stages[4][i];
             for (std::size_t j = 0; j < 4; ++j) sum += Table::a[4][j] * room.stages[j][i];
             room.increment[i] = sum;
@@ -386,7 +393,7 @@ class KernelOf<System, X, Rosenbrock4> {
 
     static void add(C& to, double factor, const C& what)
     {
-        for_each_component(to, [&](auto i) { to[i] += factor * what[i]; });
+        for_components(to, [&](auto i) { to[i] += factor * what[i]; });
     }
 
     /// Takes the current step; false if it is not finite.
@@ -400,7 +407,7 @@ class KernelOf<System, X, Rosenbrock4> {
         Room& room = of.room;
         const std::size_t n = state.x0.size();
         double sum = 0;
-        for_each_component(state.x0, [&](auto i) {
+        for_components(state.x0, [&](auto i) {
             const auto c = static_cast<std::size_t>(i);
             const Terms term = terms(room, i, h);
             room.series[n + c] = term.first;
@@ -435,7 +442,7 @@ class KernelOf<System, X, Rosenbrock4> {
         const double* const each = state.component_atol;
         double worst = 0;
         double lost = 0;
-        for_each_component(state.x0, [&](auto i) {
+        for_components(state.x0, [&](auto i) {
             const double size = std::max(std::fabs(state.x0[i]), std::fabs(state.x1[i]));
             const double allowed = (each ? each[i] : atol) + rtol * size;
             const double ratio = error[i] == 0 ? 0 : std::fabs(error[i]) / allowed;
@@ -453,7 +460,7 @@ class KernelOf<System, X, Rosenbrock4> {
         D& of = at(door);
         Room& room = of.room;
         if (!solve(of, state, state.h)) return 0;
-        for_each_component(state.x0, [&](auto i) { room.at[i] = room.rate[i] - state.rate0[i]; });
+        for_components(state.x0, [&](auto i) { room.at[i] = room.rate[i] - state.rate0[i]; });
         substitute(state.x0.size(), room.factors.data(), room.rows.data(), room.at);
         return largest_ratio(state, room.at, rtol, atol);
     }
@@ -464,10 +471,10 @@ class KernelOf<System, X, Rosenbrock4> {
         D& of = at(door);
         if (s == 0 || !solve(of, state, s)) {
             const double lost = s == 0 ? 0 : std::numeric_limits<double>::quiet_NaN();
-            for_each_component(w, [&](auto i) { w[i] = rate[i] = lost; });
+            for_components(w, [&](auto i) { w[i] = rate[i] = lost; });
             return;
         }
-        for_each_component(w, [&](auto i) {
+        for_components(w, [&](auto i) {
             const Terms term = terms(of.room, i, s);
             w[i] = of.room.increment[i] - s * state.rate0[i];
             rate[i] = (term.first - state.rate0[i]) + s * (2 * term.second + s * (3 * term.third));

@@ -21,7 +21,7 @@ template <class CurrentStep>
     const auto scale = [&](auto i) {
         const auto c = static_cast<std::size_t>(i);
         const double atol =
-            options.component_atol.empty() ? options.atol : options.component_atol[c];
+            c < options.component_atol.size() ? options.component_atol[c] : options.atol;
         return atol + options.rtol * std::fabs(x[i]);
     };
     double size = 0;

@@ -1,8 +1,9 @@
 // The loop for one type of state.
 #pragma once
 
-#include <algorithm>
 #include <array>
+#include <memory>
+#include <vector>
 
 #include "core/engine_apply.hpp"
 #include "core/engine_find.hpp"
@@ -12,7 +13,6 @@
 #include "core/event_notes.hpp"
 #include "core/event_series.hpp"
 #include "core/event_sets.hpp"
-#include "core/large_kernel.hpp"
 #include "core/loop_events.hpp"
 #include "core/loop_output.hpp"
 #include "core/loop_planned.hpp"
@@ -22,10 +22,10 @@
 #include "core/loop_setup.hpp"
 #include "core/loop_steps.hpp"
 #include "core/monitor_loop.hpp"
+#include "core/named_kernels.hpp"
 #include "core/planner_checks.hpp"
 #include "core/planner_close.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detect/extremum.hpp"
 
 namespace ricochet::detail {
 
@@ -108,63 +108,14 @@ Run<X> run_whole(const RunSetup<X>& setup, const X& x0, const Options& options)
     return Loop<X, false>(setup, x0, options).take();
 }
 
-template <class X, class Method, class Screen>
-inline constexpr QuietKernel<X> quiet_by_pointer =
-    KernelOf<ByPointer, X, Method>::template quiet<true, Screen>();
-
-/// A kernel of this library that calls by pointer, with the quiet runs of systems without guards
-/// and of systems with one guard that `Extremum` screens.
-template <class X>
-struct NamedKernel {
-    StepKernel<X> step;
-    QuietKernel<X> unguarded = nullptr;
-    QuietKernel<X> screened = nullptr;
-};
-
-template <class X>
-[[nodiscard]] const std::array<NamedKernel<X>, 5>& named_kernels() noexcept
-{
-    static const std::array<NamedKernel<X>, 5> kernels = [] {
-        const auto fixed_only = []<class Method>(Method) {
-            return NamedKernel<X>{.step = KernelOf<ByPointer, X, Method>::make()};
-        };
-        const auto controlled = []<class Method>(Method) {
-            return NamedKernel<X>{.step = KernelOf<ByPointer, X, Method>::make(),
-                                  .unguarded = quiet_by_pointer<X, Method, void>,
-                                  .screened = quiet_by_pointer<X, Method, Extremum>};
-        };
-        if constexpr (fixed_size<X>() > 0) {
-            return std::array<NamedKernel<X>, 5>{fixed_only(Euler{}), fixed_only(Rk4{}),
-                                                 controlled(CashKarp54{}), controlled(Dopri5{}),
-                                                 controlled(Fehlberg78{})};
-        } else {
-            return std::array<NamedKernel<X>, 5>{{{LargeKernel<EulerTableau>::make()},
-                                                  {LargeKernel<Rk4Tableau>::make()},
-                                                  {LargeKernel<CashKarp54Tableau>::make()},
-                                                  {LargeKernel<Dopri5Tableau>::make()},
-                                                  {LargeKernel<Fehlberg78Tableau>::make()}}};
-        }
-    }();
-    return kernels;
-}
-
-template <class X>
-const StepKernel<X>& kernel_by_name(MethodName name) noexcept
-{
-    return named_kernels<X>()[static_cast<std::size_t>(name)].step;
-}
-
 /// Kernel of the quiet runs of a set-up: its own, or that of one of the library's methods.
 template <class X>
 QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
 {
     const SystemTable<X>& system = *setup.system;
     if (setup.quiet || !setup.error_controlled) return setup.quiet;
-    const auto& kernels = named_kernels<X>();
-    const auto named = std::find_if(kernels.begin(), kernels.end(), [&](const auto& kernel) {
-        return &kernel.step == setup.kernel;
-    });
-    if (named == kernels.end()) return nullptr;
+    const NamedKernel<X>* const named = named_kernel(setup.kernel);
+    if (!named) return nullptr;
     if (!system.guarded) return named->unguarded;
     const DetectorTable<X>& detector = setup.detector;
     const bool alone = system.guard_alone && system.point;
@@ -175,17 +126,16 @@ QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
 
 }  // namespace ricochet::detail
 
-#define RICOCHET_CORE(...)                                                                        \
-    namespace ricochet::detail {                                                                  \
-    using CoreStateHere = __VA_ARGS__;                                                            \
-    template std::unique_ptr<AnyLoop<CoreStateHere>> make_loop(const RunSetup<CoreStateHere>&,    \
-                                                               const CoreStateHere&,              \
-                                                               const Options&);                   \
-    template std::unique_ptr<LendingLoop<CoreStateHere>> make_lending_loop(                       \
-        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&);                    \
-    template std::unique_ptr<AnyMonitor<CoreStateHere>> make_monitor(                             \
-        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&, bool);              \
-    template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&,   \
-                                          const Options&);                                        \
-    template const StepKernel<CoreStateHere>& kernel_by_name<CoreStateHere>(MethodName) noexcept; \
+#define RICOCHET_CORE(...)                                                                      \
+    namespace ricochet::detail {                                                                \
+    using CoreStateHere = __VA_ARGS__;                                                          \
+    template std::unique_ptr<AnyLoop<CoreStateHere>> make_loop(const RunSetup<CoreStateHere>&,  \
+                                                               const CoreStateHere&,            \
+                                                               const Options&);                 \
+    template std::unique_ptr<LendingLoop<CoreStateHere>> make_lending_loop(                     \
+        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&);                  \
+    template std::unique_ptr<AnyMonitor<CoreStateHere>> make_monitor(                           \
+        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&, bool);            \
+    template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&, \
+                                          const Options&);                                      \
     }

@@ -272,10 +272,9 @@ private:
         const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
         if (!(gap <= 4 * ulp + 1e-9 * step.h)) throw_gap(step_.start().value, step.t);
         const X& x = step_.x0();
-        for_each_component(x, [&](auto i) {
-            const auto c = static_cast<std::size_t>(i);
-            if (!(x[i] == step.x0[c])) throw_state_moved(c, x[i], step.x0[c]);
-        });
+        for (std::size_t i = 0; i < x.size(); ++i) {
+            if (!(x[i] == step.x0[i])) throw_state_moved(i, x[i], step.x0[i]);
+        }
     }
 
     [[nodiscard]] bool ends_at_time_event(const HostStepTable& step) const

@@ -274,12 +274,11 @@ public:
         aligned_ = false;
         of.start = host.start();
         of.h = host.h;
-        for_components([&](auto i) {
-            const auto c = static_cast<std::size_t>(i);
-            of.x1[i] = host.x1[c];
-            of.rate0[i] = host.rate0[c];
-            of.rate1[i] = host.rate1[c];
-        });
+        for (std::size_t i = 0; i < of.x0.size(); ++i) {
+            of.x1[i] = host.x1[i];
+            of.rate0[i] = host.rate0[i];
+            of.rate1[i] = host.rate1[i];
+        }
     }
 
     /// An interpolant need not begin at the start state to the last bit, and one that is
@@ -302,7 +301,7 @@ public:
     /// Sets the flow at the start to the rate that a host has computed.
     void set_rate(const double* dxdt) noexcept
     {
-        for_components([&](auto i) { state_.rate0[i] = dxdt[static_cast<std::size_t>(i)]; });
+        for (std::size_t i = 0; i < state_.x0.size(); ++i) state_.rate0[i] = dxdt[i];
     }
 
     /// Takes a step of length h, without a check of its error. False if the end of the step or the

@@ -76,10 +76,8 @@ void expect_bits_of_odeint(State x)
         }
         expect_same_bits(ours.x1(), theirs.x1());
         expect_same_bits(ours.rate1(), theirs.rate1());
-        State at = x;
-        State there = x;
-        State rate = x;
-        State their_rate = x;
+        auto at = detail::core_state(x);
+        auto there = at, rate = at, their_rate = at;
         for (const double s : {0.3 * h, 0.77 * h}) {
             ours.interpolate(s, at);
             theirs.interpolate(s, there);

@@ -12,14 +12,15 @@ namespace ricochet::step_test {
 namespace {
 
 using X = std::array<double, 2>;
+using Core = detail::CoreState<X>;
 using test::WalledOscillator;
 
 template <class Method>
 using StepOf = test::StepOf<Method, WalledOscillator, X>;
 
-static_assert(MethodStep<StepOf<Rk4>, X>);
-static_assert(MethodStep<StepOf<Dopri5>, X>);
-static_assert(MethodStep<StepOf<Fehlberg78>, X>);
+static_assert(MethodStep<StepOf<Rk4>, Core>);
+static_assert(MethodStep<StepOf<Dopri5>, Core>);
+static_assert(MethodStep<StepOf<Fehlberg78>, Core>);
 
 template <class Method>
 class StepTest : public testing::Test {
@@ -33,8 +34,8 @@ TYPED_TEST(StepTest, RestepToTheEndIsTheStep)
     const WalledOscillator oscillator;
     StepOf<TypeParam> step(oscillator, 0, {1.0, 0.5});
     step.attempt(0.1);
-    X x;
-    X rate;
+    Core x(2);
+    Core rate(2);
     step.restep(0.1, x, rate);
     EXPECT_EQ(x, step.x1());
     EXPECT_EQ(rate, step.rate1());
@@ -45,9 +46,9 @@ TYPED_TEST(StepTest, AskingDoesNotDisturbTheStep)
     const WalledOscillator oscillator;
     StepOf<TypeParam> step(oscillator, 0, {1.0, 0.5});
     step.attempt(0.1);
-    X before;
-    X between;
-    X after;
+    Core before(2);
+    Core between(2);
+    Core after(2);
     step.interpolate(0.05, before);
     step.restep(0.03, between);
     step.interpolate(0.05, after);
@@ -59,7 +60,7 @@ TYPED_TEST(StepTest, DenseOutputMeetsBothEnds)
     const WalledOscillator oscillator;
     StepOf<TypeParam> step(oscillator, 0, {1.0, 0.5});
     step.attempt(0.1);
-    X x;
+    Core x(2);
     step.interpolate(0, x);
     EXPECT_EQ(x, step.x0());
     step.interpolate(0.1, x);
@@ -74,7 +75,7 @@ TEST(Step, DenseOutputOfDopri5IsOfFourthOrder)
         const WalledOscillator oscillator;
         StepOf<Dopri5> step(oscillator, 0, {1.0, 0.0});
         step.attempt(h);
-        X x;
+        Core x(2);
         step.interpolate(0.4 * h, x);
         return std::abs(x[0] - std::cos(0.4 * h));
     };

@@ -11,9 +11,11 @@
 #include <concepts>
 #include <cstddef>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include "ricochet/detail/arithmetic.hpp"
+#include "ricochet/detail/small_state.hpp"
 
 /// Precedes a loop whose iterations do not depend on one another. (For clang the equivalent is a
 /// command, whose failure would be a warning in the user's code.)
@@ -25,11 +27,13 @@
 
 namespace ricochet::detail {
 
-/// Number of components where the type fixes it, else 0.
+/// Number of components where the type fixes it, else 0. Of a `SmallState` it is the room.
 template <class X>
 [[nodiscard]] constexpr std::size_t fixed_size() noexcept
 {
-    if constexpr (requires { std::tuple_size<X>::value; }) {
+    if constexpr (std::is_same_v<X, SmallState>) {
+        return SmallState::room;
+    } else if constexpr (requires { std::tuple_size<X>::value; }) {
         return std::tuple_size<X>::value;
     } else if constexpr (requires { X::SizeAtCompileTime; }) {
         return X::SizeAtCompileTime > 0 ? static_cast<std::size_t>(X::SizeAtCompileTime) : 0;
@@ -41,6 +45,17 @@ template <class X>
 template <class X>
 inline constexpr bool is_small = fixed_size<X>() > 0 && fixed_size<X>() <= 8;
 
+/// Calls `function(i)` for i = 0, ..., n - 1.
+template <std::size_t n, class Index = std::size_t, class Function>
+[[gnu::always_inline]] inline void for_each_index(const Function& function)
+{
+    [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline))
+    {
+        (function(static_cast<Index>(I)), ...);
+    }
+    (std::make_index_sequence<n>{});
+}
+
 /// Calls `function(i)` for every component of x, with i of the state's own index
 /// type.
 template <class X, class Function>
@@ -48,11 +63,7 @@ template <class X, class Function>
 {
     using Index = decltype(x.size());
     if constexpr (is_small<X>) {
-        [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline))
-        {
-            (function(static_cast<Index>(I)), ...);
-        }
-        (std::make_index_sequence<fixed_size<X>()>{});
+        for_each_index<fixed_size<X>(), Index>(function);
     } else {
         const Index n = x.size();
         // No component depends on another: the output does not overlap the input with a shift.
@@ -68,6 +79,7 @@ template <class X>
 [[gnu::always_inline]] inline void assign(X& to, const X& from)
 {
     if constexpr (is_small<X>) {
+        if constexpr (std::is_same_v<X, SmallState>) to.resize_like(from);
         for_each_component(
             from, [&](auto i) __attribute__((always_inline)) { to[i] = from[i]; });
     } else {

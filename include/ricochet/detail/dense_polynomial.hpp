@@ -16,6 +16,9 @@
 
 #include <array>
 #include <cstddef>
+#include <type_traits>
+
+#include "ricochet/detail/small_state.hpp"
 
 namespace ricochet {
 
@@ -170,7 +173,7 @@ public:
     {
         const auto i = static_cast<decltype(parts_.x0->size())>(index);
         double bent = 0;
-        if (parts_.series.order > 0) {
+        if (parts_.series.order > 0 && has_terms(static_cast<std::size_t>(i))) {
             bent = parts_.series.departure(static_cast<std::size_t>(i), s_, derivative);
         }
         for (std::size_t k = 0; k < 3 && parts_.w[k]; ++k) {
@@ -187,6 +190,13 @@ public:
     [[nodiscard]] auto size() const noexcept { return parts_.x0->size(); }
 
 private:
+    /// Series have terms of the components alone, not of the zeros behind them.
+    [[nodiscard]] bool has_terms([[maybe_unused]] std::size_t i) const noexcept
+    {
+        if constexpr (std::is_same_v<X, detail::SmallState>) return i < parts_.series.stride;
+        return true;
+    }
+
     DenseParts<X> parts_;
     double s_;
     detail::DenseWeights weights_;

@@ -46,13 +46,40 @@ template <class X>
     if constexpr (std::is_same_v<X, CoreState<X>>) {
         return x;
     } else {
-        CoreState<X> out{};
-        if constexpr (fixed_size<X>() == 0 || fixed_size<X>() > 4) {
-            out.resize(static_cast<std::size_t>(x.size()));
-        }
+        CoreState<X> out(static_cast<std::size_t>(x.size()));
         copy_state(x, out);
         return out;
     }
+}
+
+/// Converts a state of the loop into one like `like`, of the caller's type.
+template <class X>
+[[nodiscard]] X as_callers(const CoreState<X>& x, const X& like)
+{
+    if constexpr (std::is_same_v<X, CoreState<X>>) {
+        return x;
+    } else {
+        if (x.size() == 0) return X{};  // unknown, or not recorded
+        X out = like;
+        copy_state(x, out);
+        return out;
+    }
+}
+
+template <class X>
+[[nodiscard]] Event<X> as_callers(const Event<CoreState<X>>& event, const X& like)
+{
+    return {.t = event.t,
+            .kind = event.kind,
+            .guard = event.guard,
+            .mode_before = event.mode_before,
+            .mode_after = event.mode_after,
+            .before = as_callers(event.before, like),
+            .after = as_callers(event.after, like),
+            .bracket = event.bracket,
+            .slope = event.slope,
+            .error = event.error,
+            .late = event.late};
 }
 
 /// Argument of the functions of the table: the system, and memory for states of its own type.

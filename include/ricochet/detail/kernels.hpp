@@ -141,9 +141,14 @@ public:
     }
 };
 
-/// The kernel of a built-in method that calls the flow by pointer, compiled in the library.
+/// The kernel of a built-in method for states of `size` components that calls the flow by pointer,
+/// compiled in the library.
 template <class X>
-[[nodiscard]] const StepKernel<X>& kernel_by_name(MethodName name) noexcept;
+[[nodiscard]] const StepKernel<X>& kernel_by_name(MethodName name, std::size_t size) noexcept;
+template <>
+const StepKernel<SmallState>& kernel_by_name(MethodName name, std::size_t size) noexcept;
+template <>
+const StepKernel<std::vector<double>>& kernel_by_name(MethodName name, std::size_t size) noexcept;
 
 template <class System, class X, class Method>
 inline const StepKernel<CoreState<X>> kernel_of = KernelOf<System, X, Method>::make();
@@ -163,9 +168,9 @@ template <class System, class X, class Method>
     constexpr bool by_pointer = NameOf<Method>::known;
 #endif
     if constexpr (std::is_same_v<Method, MethodByName>) {
-        return kernel_by_name<CoreState<X>>(method.name);
+        return kernel_by_name<CoreState<X>>(method.name, fixed_size<X>());
     } else if constexpr (by_pointer) {
-        return kernel_by_name<CoreState<X>>(NameOf<Method>::name);
+        return kernel_by_name<CoreState<X>>(NameOf<Method>::name, fixed_size<X>());
     } else {
         return kernel_of<System, X, Method>;
     }

@@ -179,11 +179,21 @@ private:
         }
     }
 
+    /// A copy of a state or a rate, of the type that the guard takes.
+    [[nodiscard, gnu::always_inline]] static auto seen(const X& x)
+    {
+        if constexpr (std::is_same_v<System, ByPointer>) {
+            return Of::as_core(x);
+        } else {
+            return X(x);
+        }
+    }
+
     [[nodiscard, gnu::always_inline]] QuietEnd screen()
     {
         const auto guard = guard_at_end();
         const double t1 = caller.time(h);
-        const X x1 = of.x1, rate1 = of.rate1;
+        const auto x1 = seen(of.x1), rate1 = seen(of.rate1);
         at.g1 = guard.value(t1, x1);
         if constexpr (rates) at.rate1 = guard.raw_rate(t1, x1, rate1, h);
         QuietEnd why = QuietEnd::due;
@@ -194,12 +204,12 @@ private:
             why = QuietEnd::doubt;
         }
         if (rates && run.checks_inside) {
-            const X x = peeked();
+            const auto x = seen(peeked());
             at.inside = guard.value(caller.time(CubicCheck::inside * h), x);
             const CubicCheck look(at.g0, at.rate0, at.g1, at.rate1, h);
             const double e = look.deviation(CubicCheck::inside, at.inside);
             if (!(look.lowest(at.sign) > CubicCheck::doubt * e)) why = QuietEnd::doubt;
-            if (controlled && hardly_moves(of.x0, x1)) why = QuietEnd::moving;
+            if (controlled && hardly_moves(of.x0, of.x1)) why = QuietEnd::moving;
         }
         return why;
     }

@@ -78,7 +78,11 @@ struct StepOf {
         [[maybe_unused]] void* const door = caller.door;
         [[maybe_unused]] const Mode mode = caller.mode;
         if constexpr (std::is_same_v<System, ByPointer>) {
-            return caller.flow(door, mode, t, x, dxdt);
+            C there = as_core(x);
+            C rate(fixed_size<X>());
+            const bool fits = caller.flow(door, mode, t, there, rate);
+            put(rate, dxdt);
+            return fits;
         } else {
             return call_flow(at(door).system(), mode, t, x, dxdt);
         }
@@ -167,6 +171,13 @@ struct StepOf {
             ((to[own(I, to)] = from[own(I, from)]), ...);
         }
         (std::make_index_sequence<fixed_size<X>()>{});
+    }
+    /// A state as the functions of a `SystemTable` take it.
+    [[nodiscard, gnu::always_inline]] static C as_core(const X& x)
+    {
+        C there(fixed_size<X>());
+        put(x, there);
+        return there;
     }
     [[nodiscard, gnu::always_inline]] static X own_copy(const C& from)
     {

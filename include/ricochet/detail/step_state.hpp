@@ -25,8 +25,8 @@ namespace ricochet::detail {
 
 /// Type of the loop's states where those of the caller are X.
 template <class X>
-using CoreState = std::conditional_t<(fixed_size<X>() >= 1 && fixed_size<X>() <= 4),
-                                     std::array<double, fixed_size<X>()>, std::vector<double>>;
+using CoreState = std::conditional_t<(fixed_size<X>() >= 1 && fixed_size<X>() <= 4), SmallState,
+                                     std::vector<double>>;
 
 /// Start of a step, to the last bit.
 template <class X>

@@ -437,7 +437,7 @@ public:
     void state(const X& x)
     {
         (*this)(static_cast<std::size_t>(x.size()));
-        for_each_component(x, [&](auto i) { snapshot_->numbers.push_back(x[i]); });
+        for (decltype(x.size()) i = 0; i < x.size(); ++i) snapshot_->numbers.push_back(x[i]);
     }
 
 private:
@@ -475,7 +475,7 @@ public:
         } else {
             if (size != static_cast<std::size_t>(x.size())) throw_snapshot_does_not_fit();
         }
-        for_each_component(x, [&](auto i) { (*this)(x[i]); });
+        for (decltype(x.size()) i = 0; i < x.size(); ++i) (*this)(x[i]);
     }
 
     /// Checks that everything has been read.

@@ -113,11 +113,7 @@ template <class X>
 [[nodiscard]] Run<std::vector<double>> with_plain_states(Run<X> run)
 {
     if constexpr (std::is_same_v<X, std::vector<double>>) return run;
-    const auto plain = [](const X& x) {
-        std::vector<double> out;
-        for (std::size_t i = 0; i < static_cast<std::size_t>(x.size()); ++i) out.push_back(x[i]);
-        return out;
-    };
+    const auto plain = [](const X& x) { return std::vector<double>(x.begin(), x.end()); };
     Run<std::vector<double>> out{.outcome = run.outcome,
                                  .t = run.t,
                                  .x = plain(run.x),

@@ -53,15 +53,9 @@ public:
 [[nodiscard]] std::unique_ptr<AnyRun> make_run(std::shared_ptr<const CallbackSystem> system,
                                                const double* x0, const RunOptions& options);
 
-// One function for each type of state.
-[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_1(std::shared_ptr<const CallbackSystem>,
-                                                    const double*, const RunOptions&);
-[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_2(std::shared_ptr<const CallbackSystem>,
-                                                    const double*, const RunOptions&);
-[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_3(std::shared_ptr<const CallbackSystem>,
-                                                    const double*, const RunOptions&);
-[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_4(std::shared_ptr<const CallbackSystem>,
-                                                    const double*, const RunOptions&);
+// One function for each type of state: up to four doubles, and any number.
+[[nodiscard]] std::unique_ptr<AnyRun> make_run_of_small(std::shared_ptr<const CallbackSystem>,
+                                                        const double*, const RunOptions&);
 [[nodiscard]] std::unique_ptr<AnyRun> make_run_of_any(std::shared_ptr<const CallbackSystem>,
                                                       const double*, const RunOptions&);
 

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -23,7 +22,7 @@ class RunOf final : public AnyRun {
 public:
     RunOf(std::shared_ptr<const CallbackSystem> system, const X& x0, const RunOptions& options)
         : callbacks_(std::move(system), x0, options.finders),
-          loop_(detail::make_loop(setup_of(options), x0, options.options))
+          loop_(detail::make_loop(setup_of(x0.size(), options), x0, options.options))
     {
     }
 
@@ -100,22 +99,22 @@ private:
     }
 
     template <class Method>
-    static void set_method(detail::RunSetup<X>& setup, bool fixed_step)
+    static void set_method(detail::RunSetup<X>& setup, std::size_t size, bool fixed_step)
     {
         setup.error_controlled = !fixed_step;
         setup.stepping = fixed_step ? detail::written_type<FixedStep<Method>>()
                                     : detail::written_type<ErrorControlled<Method>>();
-        setup.kernel = &detail::kernel_by_name<X>(detail::NameOf<Method>::name);
+        setup.kernel = &detail::kernel_by_name<X>(detail::NameOf<Method>::name, size);
     }
-    [[nodiscard]] detail::RunSetup<X> setup_of(const RunOptions& options) const
+    [[nodiscard]] detail::RunSetup<X> setup_of(std::size_t size, const RunOptions& options) const
     {
         detail::RunSetup<X> setup = callbacks_.setup();
         switch (options.method) {
-            case RC_DOPRI5: set_method<Dopri5>(setup, options.fixed_step); break;
-            case RC_FEHLBERG78: set_method<Fehlberg78>(setup, options.fixed_step); break;
-            case RC_CASH_KARP54: set_method<CashKarp54>(setup, options.fixed_step); break;
-            case RC_RK4: set_method<Rk4>(setup, options.fixed_step); break;
-            case RC_EULER: set_method<Euler>(setup, options.fixed_step); break;
+            case RC_DOPRI5: set_method<Dopri5>(setup, size, options.fixed_step); break;
+            case RC_FEHLBERG78: set_method<Fehlberg78>(setup, size, options.fixed_step); break;
+            case RC_CASH_KARP54: set_method<CashKarp54>(setup, size, options.fixed_step); break;
+            case RC_RK4: set_method<Rk4>(setup, size, options.fixed_step); break;
+            case RC_EULER: set_method<Euler>(setup, size, options.fixed_step); break;
             case RC_TAYLOR: break;  // refused with the options
         }
         return setup;
@@ -125,27 +124,14 @@ private:
     std::unique_ptr<detail::AnyLoop<X>> loop_;
 };
 
-/// A run with states of n doubles; 0: of any number.
-template <std::size_t n>
+/// A run with states of type X, from a start of `dimension` doubles.
+template <class X>
 [[nodiscard]] std::unique_ptr<AnyRun> make_run_with(std::shared_ptr<const CallbackSystem> system,
                                                     const double* x0, const RunOptions& options)
 {
-    if constexpr (n > 0) {
-        std::array<double, n> start;
-        std::copy_n(x0, n, start.begin());
-        return std::make_unique<RunOf<std::array<double, n>>>(std::move(system), start, options);
-    } else {
-        std::vector<double> start(system->dimension());
-        std::copy_n(x0, start.size(), start.begin());
-        return std::make_unique<RunOf<std::vector<double>>>(std::move(system), start, options);
-    }
+    X start(system->dimension());
+    std::copy_n(x0, start.size(), start.begin());
+    return std::make_unique<RunOf<X>>(std::move(system), start, options);
 }
 
 }  // namespace ricochet::c
-
-#define RICOCHET_C_RUN(suffix, n)                                                                  \
-    std::unique_ptr<ricochet::c::AnyRun> ricochet::c::make_run_of_##suffix(                        \
-        std::shared_ptr<const CallbackSystem> system, const double* x0, const RunOptions& options) \
-    {                                                                                              \
-        return make_run_with<n>(std::move(system), x0, options);                                   \
-    }

@@ -98,13 +98,9 @@ static_assert(static_cast<int>(Outcome::reached_end) == RC_REACHED_END &&
 std::unique_ptr<AnyRun> make_run(std::shared_ptr<const CallbackSystem> system, const double* x0,
                                  const RunOptions& options)
 {
-    switch (system->dimension()) {
-        case 1: return make_run_of_1(std::move(system), x0, options);
-        case 2: return make_run_of_2(std::move(system), x0, options);
-        case 3: return make_run_of_3(std::move(system), x0, options);
-        case 4: return make_run_of_4(std::move(system), x0, options);
-        default: return make_run_of_any(std::move(system), x0, options);
-    }
+    return system->dimension() <= ricochet::detail::SmallState::room
+               ? make_run_of_small(std::move(system), x0, options)
+               : make_run_of_any(std::move(system), x0, options);
 }
 
 }  // namespace ricochet::c

@@ -86,7 +86,7 @@ OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door
         setup.stepping = request.fixed ? detail::written_type<FixedStep<Taylor>>()
                                        : detail::written_type<ErrorControlled<Taylor>>();
     } else {
-        setup.kernel = &detail::kernel_by_name<State>(request.method);
+        setup.kernel = &detail::kernel_by_name<State>(request.method, 0);
         setup.method_by_name = true;
         setup.stepping = request.fixed ? detail::written_type<FixedStep<MethodByName>>()
                                        : detail::written_type<ErrorControlled<MethodByName>>();

@@ -1,3 +1,0 @@
-#include "bindings/c/run_of.hpp"
-
-RICOCHET_C_RUN(1, 1)

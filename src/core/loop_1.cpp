@@ -1,3 +1,0 @@
-#include "core/instantiate.hpp"
-
-RICOCHET_CORE(std::array<double, 1>)

@@ -1,0 +1,3 @@
+#include "core/instantiate.hpp"
+
+RICOCHET_CORE(SmallState)
