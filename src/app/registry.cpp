@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "input.hpp"
-#include "systems/entries.hpp"
 
 namespace ricochet::app {
 

@@ -146,6 +146,10 @@ struct SystemEntry {
                               RunSettings& settings) = nullptr;
 };
 
+/// The systems of this program, in the order of the lists: of the command line, in
+/// systems/entries.cpp, or of the demo.
+[[nodiscard]] std::vector<SystemEntry> all_entries();
+
 [[nodiscard]] const std::vector<SystemEntry>& systems();
 
 /// Fills in the functions of a system, in the program that contains them.
