@@ -58,24 +58,31 @@ class LargeKernel {
         for (std::size_t j = 0; j < last; ++j) k[j + 1] = kept[j].data();
         RICOCHET_NO_DEPENDENCE
         for (std::size_t i = 0; i < n; ++i) {
-            double departing = 0;
+            [[maybe_unused]] double newest = 0, departing = 0;
             if constexpr (raw > 0) {
-                departing = k[raw][i] - rate0[i];
+                newest = k[raw][i];
+                departing = newest - rate0[i];
                 k[raw][i] = departing;
             }
-            double bent = 0;
-            if constexpr (Method::template terms < Row >> 0) {
-                bent = Method::template sum_of<Row>(
-                    weights, [&](auto j) __attribute__((always_inline)) {
-                        if constexpr (j == raw) {
-                            return departing;
-                        } else {
-                            return k[j][i];
-                        }
-                    });
+            const auto rate = [&](auto j) __attribute__((always_inline))
+            {
+                if constexpr (j == raw) {
+                    return departing;
+                } else {
+                    return k[j][i];
+                }
+            };
+            if constexpr (Method::template ends_with<Row, raw>) {
+                at[i] = Method::template state_of<Row>({x0[i], rate0[i]}, s, weights, rate, newest);
+                if constexpr (keeps) sum[i] = Method::template sum_of<Row>(weights, rate);
+            } else {
+                double bent = 0;
+                if constexpr (Method::template terms < Row >> 0) {
+                    bent = Method::template sum_of<Row>(weights, rate);
+                }
+                if constexpr (keeps) sum[i] = bent;
+                at[i] = x0[i] + (s * rate0[i] + bent);
             }
-            if constexpr (keeps) sum[i] = bent;
-            at[i] = x0[i] + (s * rate0[i] + bent);
         }
     }
 
@@ -215,9 +222,9 @@ class LargeKernel {
             const V size0 = magnitude(start);
             const V size1 = magnitude(end);
             const V at_zero = each ? load<V>(each + i) : V{} + atol;
-            V ratio = error / (at_zero + rtol * (size0 > size1 ? size0 : size1));
-            if (each || atol == 0) ratio = error == 0 ? V{} : ratio;
-            return ratio;
+            V allowed = at_zero + rtol * (size0 > size1 ? size0 : size1);
+            allowed = allowed < least_tolerance ? V{} + least_tolerance : allowed;
+            return error * (1 / allowed);
         }
 
         const double* x0;

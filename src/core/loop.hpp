@@ -514,20 +514,6 @@ private:
 
     static constexpr ErrorRule rule_{};
 
-    /// As `rule_.factor`, with the errors below which the factor is the largest as constants.
-    [[nodiscard]] static double step_factor(double error, int order) noexcept
-    {
-        static constexpr auto floors = [] {
-            std::array<double, 16> powers{1};
-            for (std::size_t k = 1; k < powers.size(); ++k) {
-                powers[k] = powers[k - 1] * (rule_.safety / rule_.largest);
-            }
-            return powers;
-        }();
-        const auto k = static_cast<std::size_t>(order);
-        return k < floors.size() && error <= floors[k] ? rule_.largest : rule_.factor(error, order);
-    }
-
     std::size_t components_;         ///< number of components of the state at the start
     QuietKernel<X> quiet_;           ///< null: the loop takes every step itself
     double first_step_ = 0;          ///< [s] length of the first step

@@ -182,7 +182,7 @@ inline bool Loop<X, single>::retry(double h, double proposed, double largest, do
         if (rough) {
             h *= 0.1;
         } else if (accepts) {
-            const double next = h * std::min(largest, step_factor(error, order));
+            const double next = h * std::min(largest, rule_.factor(error, order));
             const bool cut = largest > 1 && h < proposed;
             h_next_ = std::min(cut ? std::max(next, proposed) : next, options_.h_max);
             return true;
@@ -194,7 +194,7 @@ inline bool Loop<X, single>::retry(double h, double proposed, double largest, do
             end_step(Outcome::non_finite);
             return false;
         }
-        if (!rough) h = finite ? h * step_factor(error, order) : shorten_to_surface(h);
+        if (!rough) h = finite ? h * rule_.factor(error, order) : shorten_to_surface(h);
         is_last_ = false;
         time_event_due_ = false;
         largest = 1;

@@ -4,8 +4,13 @@
 //
 // With x(t0 + s) = x0 + s f0 + w(s) the first stage of w vanishes, and so does its start:
 // a tableau reduces to its stages from the second on. The sums are formed in the
-// order of Boost.Odeint's steppers and have the same bits; terms whose coefficient is zero are
-// omitted.
+// order of Boost.Odeint's steppers; terms whose coefficient is zero are omitted. Only the state at
+// which the flow is evaluated next adds the newest rate last, since every stage waits for it:
+//
+//     x0 + ((older + (s - b) f0) + b f),    w(s) = older + b (f - f0)
+//
+// with f the newest rate, b its weight and `older` the terms of the rates before it. The steps are
+// those of odeint's steppers to rounding.
 //
 // Tableaus: Dormand and Prince, J. Comput. Appl. Math. 6 (1980) 19-26; Cash and Karp, ACM
 // Trans. Math. Softw. 16 (1990) 201-222; Fehlberg, NASA TR R-287 (1968).
@@ -200,7 +205,7 @@ public:
         }
         inner_stages(flow, h, k, std::make_index_sequence<kept_stages>{});
         combine<Weights>(h, k, to.rate, to.w);
-        if constexpr (fsal) flow(to.w, to.rate, h);
+        if constexpr (fsal) flow(RowView<Weights, kept_stages>(h, k), to.rate, h);
         if constexpr (with_error) estimate(h, k, to.rate, to.error);
     }
 
@@ -245,10 +250,12 @@ public:
     template <std::size_t i>
     struct Stage {
         static constexpr auto coefficients = Tableau::a[i];
+        static constexpr double node = Tableau::c[i];
         static constexpr double times(double h, std::size_t j) { return h * coefficients[j]; }
     };
     struct Weights {
         static constexpr auto coefficients = Tableau::b;
+        static constexpr double node = 1;
         static constexpr double times(double h, std::size_t j)
         {
             if constexpr (requires { Tableau::b_divisors; }) return h / Tableau::b_divisors[j];
@@ -291,8 +298,9 @@ public:
         return weights;
     }
 
-    /// The sum of a row; `rate(j)` is the rate of stage j, with j an integral constant.
-    template <class Row, class Array, class Rate>
+    /// The sum of the first `count` terms of a row, of which there is at least one; `rate(j)` is
+    /// the rate of stage j, with j an integral constant.
+    template <class Row, std::size_t count = used<Row>.count, class Array, class Rate>
     [[nodiscard, gnu::always_inline]] static auto sum_of(const Array& weights, const Rate& rate)
     {
         return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline))
@@ -300,7 +308,39 @@ public:
             return (... +
                     (weights[I] * rate(std::integral_constant<std::size_t, used<Row>.at[I]>{})));
         }
-        (std::make_index_sequence<used<Row>.count>{});
+        (std::make_index_sequence<count>{});
+    }
+
+    /// Whether the last rate that a row uses is that of stage `newest`.
+    template <class Row, std::size_t newest>
+    static constexpr bool ends_with = [] {
+        constexpr std::size_t count = used<Row>.count;
+        return newest > 0 && count > 0 && used<Row>.at[count > 0 ? count - 1 : 0] == newest;
+    }();
+
+    /// A component of the start of a step, and of the rate there.
+    struct AtStart {
+        double x, rate;
+    };
+
+    /// The state at offset s of a row that ends with the newest stage, whose rate is that of the
+    /// flow itself, `newest`.
+    template <class Row, class Array, class Rate>
+    [[nodiscard, gnu::always_inline]] static double state_of(const AtStart& start, double s,
+                                                             const Array& weights, const Rate& rate,
+                                                             double newest)
+    {
+        constexpr std::size_t before = used<Row>.count - 1;
+        const double weight = weights[before];
+        const double last = weight * newest;
+        if constexpr (before > 0) {
+            const double older = sum_of<Row, before>(weights, rate);
+            return start.x + ((older + (s - weight) * start.rate) + last);
+        } else if constexpr (Row::coefficients[used<Row>.at[0]] != Row::node) {
+            return start.x + ((s - weight) * start.rate + last);
+        } else {
+            return start.x + last;  // s is the weight
+        }
     }
 
     /// The same for the rates in `k`, and `rate` at the end, for one component; 0 without rates.
@@ -319,23 +359,36 @@ public:
     }
 
 private:
-    /// The departure of a stage, one component at a time.
-    template <std::size_t i>
-    class StageView {
+    /// The departure at which the flow is evaluated after stage `newest`, one component at a time.
+    /// Where the row ends with that stage its term is apart.
+    template <class Row, std::size_t newest>
+    class RowView {
+        static constexpr bool split = ends_with<Row, newest>;
+
     public:
-        [[gnu::always_inline]] StageView(double h, const X* k) noexcept
-            : k_(k), weights_(weights_of<Stage<i>>(h))
+        [[gnu::always_inline]] RowView(double h, const X* k) noexcept
+            : k_(k), weights_(weights_of<Row>(h))
         {
         }
         template <class Index>
         [[nodiscard, gnu::always_inline]] double operator[](Index c) const
         {
-            return sum<Stage<i>>(weights_, k_, k_[0], c);
+            return sum<Row>(weights_, k_, k_[0], c);
+        }
+        /// The state at offset s.
+        template <class Index>
+        [[nodiscard, gnu::always_inline]] double state(Index c, const AtStart& start, double s,
+                                                       double rate) const requires split
+        {
+            return state_of<Row>(
+                start, s,
+                weights_, [&](auto j) __attribute__((always_inline)) { return k_[j - 1][c]; },
+                rate);
         }
 
     private:
         const X* k_;
-        decltype(weights_of<Stage<i>>(0.0)) weights_;
+        decltype(weights_of<Row>(0.0)) weights_;
     };
 
     template <class Flow, std::size_t... I>
@@ -343,7 +396,7 @@ private:
                                                     [[maybe_unused]] X* k,
                                                     std::index_sequence<I...>)
     {
-        (flow(StageView<I + 1>(h, k), k[I], h * Tableau::c[I + 1]), ...);
+        (flow(RowView<Stage<I + 1>, I>(h, k), k[I], h * Tableau::c[I + 1]), ...);
     }
 
     template <class Index>

@@ -110,7 +110,7 @@ struct StepOf {
         {
         }
         X x0, rate0, remainder, zero;
-        X room, w, w_rate, error, x1, rate1;
+        X room, newest = zero, w, w_rate, error, x1, rate1;  ///< newest: of the flow itself
     };
 
     /// Computes the departure w after a step of length s, with its rate there and the error
@@ -124,22 +124,32 @@ struct StepOf {
         const auto flow = [&](const auto& departure, X& departure_rate, double offset)
             __attribute__((always_inline))
         {
-            for_each_component(
-                of.x0, [&](auto i) __attribute__((always_inline)) {
-                    of.room[i] = of.x0[i] + (offset * of.rate0[i] + departure[i]);
-                });
+            if constexpr (requires { departure.state(0, {}, offset, 0.0); }) {
+                for_each_component(
+                    of.x0, [&](auto i) __attribute__((always_inline)) {
+                        of.room[i] =
+                            departure.state(i, {of.x0[i], of.rate0[i]}, offset, of.newest[i]);
+                    });
+            } else {
+                for_each_component(
+                    of.x0, [&](auto i) __attribute__((always_inline)) {
+                        of.room[i] = of.x0[i] + (offset * of.rate0[i] + departure[i]);
+                    });
+            }
             ++caller.calls;
             if (caller.backward) {
                 caller.fits &= call(caller, caller.start.plus(-offset), of.room, departure_rate);
                 for_each_component(
                     of.x0, [&](auto i) __attribute__((always_inline)) {
-                        departure_rate[i] = -departure_rate[i] - of.rate0[i];
+                        of.newest[i] = -departure_rate[i];
+                        departure_rate[i] = of.newest[i] - of.rate0[i];
                     });
             } else {
                 caller.fits &= call(caller, caller.start.plus(offset), of.room, departure_rate);
                 for_each_component(
                     of.x0, [&](auto i) __attribute__((always_inline)) {
-                        departure_rate[i] -= of.rate0[i];
+                        of.newest[i] = departure_rate[i];
+                        departure_rate[i] = of.newest[i] - of.rate0[i];
                     });
             }
         };
@@ -239,12 +249,12 @@ struct StepOf {
         return all_finite(of.x1) && all_finite(of.rate1);
     }
 
+    /// By the reciprocal of the tolerance, which does not wait for the error.
     [[nodiscard, gnu::always_inline]] static double ratio_of(double error, double x0, double x1,
                                                              double rtol, double atol) noexcept
     {
         const double size = std::max(std::fabs(x0), std::fabs(x1));
-        const double ratio = std::fabs(error) / (atol + rtol * size);
-        return error == 0 ? 0 : ratio;
+        return std::fabs(error) * (1 / std::max(atol + rtol * size, least_tolerance));
     }
 
     /// @param atol  of a component

@@ -10,6 +10,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <type_traits>
 #include <vector>
@@ -100,6 +101,9 @@ struct StepState {
     [[nodiscard]] double in_time(double s) const noexcept { return backward ? -s : s; }
     [[nodiscard]] double time(double s) const noexcept { return start.plus(in_time(s)); }
 };
+
+/// The smallest tolerance of a component's error, in place of 0: its reciprocal is a number.
+inline constexpr double least_tolerance = 4 * std::numeric_limits<double>::min();
 
 /// The first crossing of a guard in a step, where its series determines it.
 struct SeriesCrossing {
