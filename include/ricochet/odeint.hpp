@@ -1,7 +1,7 @@
 // Any one-step method of Boost.Odeint, and steppers that fulfil its concepts, as methods.
 //
-// Euler, Rk4, CashKarp54, Dopri5 and Fehlberg78 of `methods.hpp` have the bits of odeint's
-// steppers and compile without it.
+// Euler, Rk4, CashKarp54, Dopri5 and Fehlberg78 of `methods.hpp` take the steps of odeint's
+// steppers, to rounding, and compile without it.
 //
 // Instead of the state a stepper is given the departure from the tangent at the start of the step,
 //

@@ -6,9 +6,11 @@
 // the bits keeps this file; for any other change, the commit states which lines change and why. The
 // file holds for one mathematical library, which its first line identifies by a hash of its own:
 // with another the runs and their numbers of events are compared. RICOCHET_WRITE_GOLDEN=1 rewrites
-// runs.txt.
+// runs.txt. RICOCHET_WRITE_EVENTS=<file> writes the events and the ends of all runs, of which
+// tests/golden/moved.py compares two files.
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <gtest/gtest.h>
 
 #include <bit>
@@ -16,6 +18,8 @@
 #include <cstdint>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
+#include <ostream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -63,7 +67,19 @@ std::uint64_t mathematical_library()
     return hash.value();
 }
 
-std::string line_of(const SystemEntry& system, const RunRequest& request)
+void write_run(std::ostream& out, const std::string& name, const TimedRun& timed)
+{
+    out << name << '\n';
+    for (const auto& event : timed.run.events) {
+        out << fmt::format("  {:.17g} {} {} {} {} {:.17g}\n", event.t, static_cast<int>(event.kind),
+                           event.guard, event.mode_before, event.mode_after, event.slope);
+    }
+    out << fmt::format("  end {:.17g} {} {:.17g}\n", timed.run.t,
+                       static_cast<int>(timed.run.outcome), fmt::join(timed.run.x, " "));
+}
+
+/// @param events  where to write the events, too, or null
+std::string line_of(const SystemEntry& system, const RunRequest& request, std::ostream* events)
 {
     const auto shown = [](const std::optional<std::string>& text) { return text.value_or("-"); };
     std::string out = fmt::format("{} {} {} {} {} {}", system.name,
@@ -76,6 +92,7 @@ std::string line_of(const SystemEntry& system, const RunRequest& request)
     } catch (const BadInput&) {
         return out + " refused";
     }
+    if (events) write_run(*events, out, timed);
     const Run<std::vector<double>>& run = timed.run;
     Hash hash;
     hash.add(static_cast<std::uint64_t>(run.outcome));
@@ -138,9 +155,14 @@ std::vector<std::string> all_lines()
     complete_set_valued_systems();
     std::vector<std::string> out{
         fmt::format("mathematical library {:016x}", mathematical_library())};
+    std::ofstream file;
+    const char* const events = std::getenv("RICOCHET_WRITE_EVENTS");
+    if (events) file.open(events);
     for (const SystemEntry& system : systems()) {
         if (system.run == nullptr) continue;
-        for (const RunRequest& request : requests(system)) out.push_back(line_of(system, request));
+        for (const RunRequest& request : requests(system)) {
+            out.push_back(line_of(system, request, events ? &file : nullptr));
+        }
     }
     return out;
 }

@@ -42,69 +42,71 @@ struct Tangle {
 };
 
 template <class State>
-void expect_same_bits(const State& ours, const State& theirs)
+void expect_equal_to(double tolerance, const State& ours, const State& theirs)
 {
-    for (std::size_t i = 0; i < 3; ++i) {
-        EXPECT_TRUE(ours[i] == theirs[i] || (std::isnan(ours[i]) && std::isnan(theirs[i])))
-            << ours[i] << " and " << theirs[i];
-    }
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(ours[i], theirs[i], tolerance);
 }
 
 /// Steps of random lengths from random states, forward and backward, with all their results.
+///
+/// Ours add the newest rate last, and so round differently. With |x| <= 10 and |t| <= 5 the rates
+/// are below 90 and their derivatives below 11; a step of at most 0.05 changes a state by at most
+/// 4.5 and a perturbation by a factor below two. Each of up to 13 stages rounds its state, below
+/// 15, a few times, and a tableau's coefficients reach 12: 13 * 4 * 12 ulps of 15 (1.8e-15) are
+/// 1.1e-12 in the state, and 11 times as much in the rate.
 template <class Ours, template <class...> class Theirs, class State>
-void expect_bits_of_odeint(State x)
+void expect_steps_of_odeint(State x)
 {
+    const double of_state = 1.1e-12, of_rate = 11 * of_state;
     const Tangle system;
     std::mt19937 random(1);
     std::uniform_real_distribution<double> uniform(-1, 1);
     for (int k = 0; k < 500 && !testing::Test::HasFailure(); ++k) {
         for (std::size_t i = 0; i < 3; ++i) x[i] = 10 * uniform(random);
         const double t = 5 * uniform(random);
-        const double h = std::exp(5 * uniform(random) - 4);
+        const double h = std::exp(3 * uniform(random) - 6);
         test::StepOf<Ours, Tangle, State> ours(system, t, x, 0, k % 2 == 1);
         test::StepOf<Odeint<Theirs>, Tangle, State> theirs(system, t, x, 0, k % 2 == 1);
         if constexpr (detail::has_error_estimate<typename Ours::template Stepper<State>>) {
             const double error = ours.attempt(h, 1e-8, 1e-8);
             const double their_error = theirs.attempt(h, 1e-8, 1e-8);
-            // Where an estimate of zero is replaced, the rates are straight up to rounding: at most
-            // 0.14 ulps of h times them, over 1e-8.
-            constexpr bool replaced = Ours::template Stepper<State>::estimates_quadrature;
-            EXPECT_TRUE(error == their_error || std::isnan(error) || (replaced && error < 1e-5));
+            // Over 1e-8 (1 + |x|); the estimates are sums like the states.
+            EXPECT_NEAR(error, their_error, of_state / 1e-8);
         } else {
             ours.attempt(h);
             theirs.attempt(h);
         }
-        expect_same_bits(ours.x1(), theirs.x1());
-        expect_same_bits(ours.rate1(), theirs.rate1());
+        expect_equal_to(of_state, ours.x1(), theirs.x1());
+        expect_equal_to(of_rate, ours.rate1(), theirs.rate1());
         auto at = detail::core_state(x);
         auto there = at, rate = at, their_rate = at;
         for (const double s : {0.3 * h, 0.77 * h}) {
             ours.interpolate(s, at);
             theirs.interpolate(s, there);
-            expect_same_bits(at, there);
+            expect_equal_to(of_state, at, there);
             ours.restep(s, at, rate);
             theirs.restep(s, there, their_rate);
-            expect_same_bits(at, there);
-            expect_same_bits(rate, their_rate);
+            expect_equal_to(of_state, at, there);
+            expect_equal_to(of_rate, rate, their_rate);
         }
         EXPECT_EQ(ours.flow_calls(), theirs.flow_calls());
     }
 }
 
 template <class State>
-void expect_all_bits_of_odeint(const State& x)
+void expect_all_steps_of_odeint(const State& x)
 {
-    expect_bits_of_odeint<Euler, odeint::euler>(x);
-    expect_bits_of_odeint<Rk4, odeint::runge_kutta4_classic>(x);
-    expect_bits_of_odeint<CashKarp54, odeint::runge_kutta_cash_karp54_classic>(x);
-    expect_bits_of_odeint<Dopri5, odeint::runge_kutta_dopri5>(x);
-    expect_bits_of_odeint<Fehlberg78, odeint::runge_kutta_fehlberg78>(x);
+    expect_steps_of_odeint<Euler, odeint::euler>(x);
+    expect_steps_of_odeint<Rk4, odeint::runge_kutta4_classic>(x);
+    expect_steps_of_odeint<CashKarp54, odeint::runge_kutta_cash_karp54_classic>(x);
+    expect_steps_of_odeint<Dopri5, odeint::runge_kutta_dopri5>(x);
+    expect_steps_of_odeint<Fehlberg78, odeint::runge_kutta_fehlberg78>(x);
 }
 
-TEST(Odeint, OurMethodsHaveTheBitsOfItsSteppers)
+TEST(Odeint, OurMethodsTakeTheStepsOfItsSteppers)
 {
-    expect_all_bits_of_odeint(std::array<double, 3>{});
-    expect_all_bits_of_odeint(std::vector<double>(3));
+    expect_all_steps_of_odeint(std::array<double, 3>{});
+    expect_all_steps_of_odeint(std::vector<double>(3));
 }
 
 TEST(Odeint, ItsOtherOneStepMethodsWork)
