@@ -153,18 +153,17 @@ public:
         for (Piece& piece : pieces_) {
             for (double* number : {&piece.t, &piece.length, &piece.h}) visit(*number);
             auto nodes = static_cast<std::uint8_t>(piece.nodes);
-            std::size_t departures = piece.w.size(), slopes = piece.slope.size();
             visit(piece.backward);
             visit(piece.mode);
             visit(nodes);
-            visit(departures);
-            visit(slopes);
+            visit(piece.departures);
+            visit(piece.slopes);
             piece.nodes = static_cast<DenseNodes>(nodes);
-            piece.w.resize(std::min<std::size_t>(departures, 3));
-            piece.slope.resize(std::min<std::size_t>(slopes, piece.w.size()));
+            piece.departures = std::min<std::size_t>(piece.departures, 3);
+            piece.slopes = std::min(piece.slopes, piece.departures);
             for (State* x : {&piece.x0, &piece.remainder, &piece.rate0}) visit.state(*x);
-            for (State& x : piece.w) visit.state(x);
-            for (State& x : piece.slope) visit.state(x);
+            for (std::size_t k = 0; k < piece.departures; ++k) visit.state(piece.w[k]);
+            for (std::size_t k = 0; k < piece.slopes; ++k) visit.state(piece.slope[k]);
             if (piece.nodes == DenseNodes::series) {
                 std::size_t numbers = piece.series.size();
                 visit(numbers);
@@ -187,8 +186,8 @@ public:
                     .remainder = *parts.remainder,
                     .rate0 = *parts.rate0};
         for (std::size_t k = 0; k < 3; ++k) {
-            if (parts.w[k]) piece.w.push_back(*parts.w[k]);
-            if (parts.w[k] && parts.slope[k]) piece.slope.push_back(*parts.slope[k]);
+            if (parts.w[k]) piece.w[piece.departures++] = *parts.w[k];
+            if (parts.w[k] && parts.slope[k]) piece.slope[piece.slopes++] = *parts.slope[k];
         }
         if (parts.nodes == DenseNodes::series) {
             const double* const first = parts.series.coefficients;
@@ -202,12 +201,12 @@ public:
     template <class Other, class Convert>
     void add_from(const Solution<Other>& from, const Convert& convert)
     {
-        const auto all = [&](const std::vector<Other>& states) {
-            std::vector<State> out;
-            out.reserve(states.size());
-            for (const Other& state : states) out.push_back(convert(state));
+        const auto all = [&](const std::array<Other, 3>& states, std::size_t count) {
+            std::array<State, 3> out{};
+            for (std::size_t k = 0; k < count; ++k) out[k] = convert(states[k]);
             return out;
         };
+        if (pieces_.empty()) pieces_.reserve(from.pieces_.size());
         for (std::size_t i = pieces_.size(); i < from.pieces_.size(); ++i) {
             const auto& piece = from.pieces_[i];
             pieces_.push_back({.t = piece.t,
@@ -219,8 +218,10 @@ public:
                                .x0 = convert(piece.x0),
                                .remainder = convert(piece.remainder),
                                .rate0 = convert(piece.rate0),
-                               .w = all(piece.w),
-                               .slope = all(piece.slope),
+                               .departures = piece.departures,
+                               .slopes = piece.slopes,
+                               .w = all(piece.w, piece.departures),
+                               .slope = all(piece.slope, piece.slopes),
                                .series = piece.series});
         }
     }
@@ -241,7 +242,8 @@ private:
         Mode mode;
         DenseNodes nodes;
         State x0, remainder, rate0;
-        std::vector<State> w{}, slope{};
+        std::size_t departures = 0, slopes = 0;  ///< numbers of `w` and `slope`
+        std::array<State, 3> w{}, slope{};
         std::vector<double> series{};
     };
 
@@ -265,8 +267,8 @@ private:
                                 .x0 = &piece.x0,
                                 .remainder = &piece.remainder,
                                 .rate0 = &piece.rate0};
-        const std::size_t without_slope = piece.w.size() - piece.slope.size();
-        for (std::size_t k = 0; k < piece.w.size(); ++k) {
+        const std::size_t without_slope = piece.departures - piece.slopes;
+        for (std::size_t k = 0; k < piece.departures; ++k) {
             parts.w[k] = &piece.w[k];
             if (k >= without_slope) parts.slope[k] = &piece.slope[k - without_slope];
         }

@@ -161,7 +161,7 @@ void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
     to.guard = run.guard;
     to.other_guard = run.other_guard;
     to.statistics = run.statistics;
-    to.events.reserve(run.events.size());
+    if (to.events.empty()) to.events.reserve(run.events.size());
     for (std::size_t i = to.events.size(); i < run.events.size(); ++i) {
         to.events.push_back(as_callers(run.events[i], like));
     }
