@@ -246,6 +246,7 @@ public:
                                               engine_options(options), options.cut_at_all)),
           room_(detail::core_state(like))
     {
+        shown_.cut.fired.reserve(monitor_->cut().fired.capacity());
     }
     explicit EventMonitor(System&&, const X&, const MonitorOptions& = {}, const Detector& = {},
                           const Locator& = {}) = delete;
