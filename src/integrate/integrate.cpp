@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -121,5 +122,14 @@ void throw_start_guard_not_finite(std::string_view who, std::size_t which, std::
     throw std::invalid_argument(fmt::format("{}: {} must be finite at the start, got {} at t = {}",
                                             who, guard_called(which, name), guard, t));
 }
+
+template void update(Run<std::array<double, 1>>&, const Run<SmallState>&,
+                     const std::array<double, 1>&);
+template void update(Run<std::array<double, 2>>&, const Run<SmallState>&,
+                     const std::array<double, 2>&);
+template void update(Run<std::array<double, 3>>&, const Run<SmallState>&,
+                     const std::array<double, 3>&);
+template void update(Run<std::array<double, 4>>&, const Run<SmallState>&,
+                     const std::array<double, 4>&);
 
 }  // namespace ricochet::detail

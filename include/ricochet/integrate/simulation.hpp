@@ -13,6 +13,7 @@
 // of a system, a method, a detector and a locator.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <type_traits>
@@ -183,6 +184,16 @@ void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
                           .allowed = wrong.allowed};
     }
 }
+
+// Compiled in the library.
+extern template void update(Run<std::array<double, 1>>&, const Run<SmallState>&,
+                            const std::array<double, 1>&);
+extern template void update(Run<std::array<double, 2>>&, const Run<SmallState>&,
+                            const std::array<double, 2>&);
+extern template void update(Run<std::array<double, 3>>&, const Run<SmallState>&,
+                            const std::array<double, 3>&);
+extern template void update(Run<std::array<double, 4>>&, const Run<SmallState>&,
+                            const std::array<double, 4>&);
 
 /// A run with states of the caller's type.
 template <class X>
