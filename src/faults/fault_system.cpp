@@ -58,30 +58,30 @@ template <class L>
     return law.evaluate(v, xi);
 }
 
-/// Products with K and sqrt(K) by transforms, with their scratch memory.
-struct Transforms {
-    StiffnessProduct product;
-    StiffnessSeries::Scratch scratch{};
-    VectorXd in, out;
-
-    explicit Transforms(const StiffnessSeries& root, const FaultStiffness& stiffness)
-        : product(stiffness),
-          in(static_cast<Index>(stiffness.size())),
-          out(static_cast<Index>(stiffness.size())),
-          root_(&root)
-    {
-    }
-
-    void root_of(const VectorXd& x, VectorXd& y) { root_->apply(product, x, y, scratch); }
-
-private:
-    const StiffnessSeries* root_;
-};
-
 }  // namespace
 
 /// Everything is in metres and seconds over D_RS and V; forces are per mass rho L.
 struct RateStateFaultSystem::Parts {
+    /// Products with K and sqrt(K) by transforms, with their scratch memory.
+    struct Transforms {
+        StiffnessProduct product;
+        StiffnessSeries::Scratch scratch{};
+        VectorXd in, out;
+
+        explicit Transforms(const StiffnessSeries& root, const FaultStiffness& stiffness)
+            : product(stiffness),
+              in(static_cast<Index>(stiffness.size())),
+              out(static_cast<Index>(stiffness.size())),
+              root_(&root)
+        {
+        }
+
+        void root_of(const VectorXd& x, VectorXd& y) { root_->apply(product, x, y, scratch); }
+
+    private:
+        const StiffnessSeries* root_;
+    };
+
     Parts(const StrikeSlipFault& of, const FaultFriction& with, double polynomial_bound)
         : fault(of), friction(with), law(law_of(with)), size(of.size())
     {
