@@ -12,7 +12,7 @@ inline void Loop<X, single>::emit_samples(double s, double end)
     while (next_sample_ < times.size() && lies_before(times[next_sample_], end)) {
         const double offset = std::min(step_.until(times[next_sample_]), s);
         X x = step_.x0();
-        if (offset > 0) step_.sample(offset, x);
+        if (offset > 0) step_.sample(offset, options_.rtol, options_.atol, x);
         add_sample(std::move(x));
     }
 }

@@ -216,9 +216,11 @@ public:
 
     /// x(t0 + s) as accurately as is possible at low cost: by dense output of the method's own
     /// order, or by a step of its own.
-    void sample(double s, X& x) const
+    void sample(double s, double rtol, double atol, X& x) const
     {
-        if (kernel_->interpolates()) {
+        if (kernel_->sample && kernel_->sample(system_.door(), state_, s, rtol, atol, x)) {
+            add_tangent(s, x);
+        } else if (kernel_->interpolates()) {
             interpolate(s, x);
         } else {
             restep(s, x);

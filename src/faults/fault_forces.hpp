@@ -8,6 +8,16 @@
 
 namespace ricochet::detail {
 
+/// sigma of each element with rate-and-state friction, nondimensional.
+[[nodiscard]] inline Eigen::VectorXd normal_forces(const StrikeSlipFault& fault,
+                                                   const FaultFriction& friction)
+{
+    if (friction.normal_stress == 0) return fault.weight();
+    const auto& p = fault.parameters();
+    return Eigen::VectorXd::Constant(
+        fault.size(), friction.normal_stress * p.side / (p.shear_modulus * p.slip_distance));
+}
+
 /// Products with K and H, with scratch memory of their own.
 class FaultForces {
 public:

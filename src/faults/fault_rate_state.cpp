@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "../checks/require.hpp"
+#include "fault_forces.hpp"
 #include "ricochet/detail/fault_friction_stage.hpp"
 #include "ricochet/detail/variational_step.hpp"
 #include "rupture_record.hpp"
@@ -38,15 +39,6 @@ struct StageRates {
     VectorXd u, v, xi;
 };
 
-/// N of each element, nondimensional.
-VectorXd normal_forces(const StrikeSlipFault& fault, const FaultFriction& friction)
-{
-    if (friction.normal_stress == 0) return fault.weight();
-    const auto& p = fault.parameters();
-    return VectorXd::Constant(
-        fault.size(), friction.normal_stress * p.side / (p.shear_modulus * p.slip_distance));
-}
-
 /// One run with a law of a certain type.
 template <class Law>
 class Runner {
@@ -58,7 +50,7 @@ public:
           how_(how),
           law_(friction.law),
           table_(&detail::sdirk_table(how.order)),
-          normal_(normal_forces(fault, friction)),
+          normal_(detail::normal_forces(fault, friction)),
           stiffness_(fault, options.polynomial_bound > 0 ? options.polynomial_bound : 1e-4),
           stage_(law_, fault, stiffness_, normal_,
                  {how.tolerance, how.max_iterations, how.max_inner}),

@@ -202,8 +202,8 @@ TEST(Rosenbrock, ASnapshotGoesOnWithTheSameBits)
     EXPECT_EQ(whole.t(), other.t());
 }
 
-// Samples are steps of their own. Between steps the solution is a cubic: the fourth derivative,
-// which is one here, leaves h^4 / 30, or 3e-8 for steps of 0.03.
+// Between steps the solution is a cubic: the fourth derivative, which is one here, leaves h^4 / 30,
+// or 3e-8 for steps of 0.03.
 TEST(Rosenbrock, SamplesAndSolutionAreThoseOfTheMotion)
 {
     std::vector<double> times;
@@ -219,6 +219,153 @@ TEST(Rosenbrock, SamplesAndSolutionAreThoseOfTheMotion)
             (2500 * std::cos(t) + 50 * std::sin(t) - 2500 * std::exp(-50 * t)) / 2501;
         EXPECT_NEAR(run.trajectory.x[k][0], exact, 1e-6);
         EXPECT_NEAR(run.solution(t)[0], exact, 1e-6);
+    }
+}
+
+/// Times evenly spaced in (0, t_end), which no step is likely to end at.
+std::vector<double> sample_times(double t_end, std::size_t count)
+{
+    std::vector<double> times;
+    for (std::size_t k = 0; k < count; ++k) {
+        times.push_back(t_end * (static_cast<double>(k) + 0.63) / static_cast<double>(count));
+    }
+    return times;
+}
+
+/// log2 of the ratio of the largest errors of samples with steps h and h / 2.
+template <class System>
+double observed_order_of_samples(const System& system, const typename System::State& x0, double h)
+{
+    const std::vector<double> times = sample_times(2, 200);
+    const auto by = [&](auto stepping, double step) {
+        return integrate(system, x0, {.t_end = 2, .step = step, .rtol = 1, .sample_times = times},
+                         stepping)
+            .trajectory.x;
+    };
+    const auto exact = by(FixedStep<Fehlberg78>{}, 0.002);
+    const auto error = [&](double step) {
+        const auto x = by(FixedStep<Rosenbrock4>{}, step);
+        double worst = 0;
+        for (std::size_t k = 0; k < times.size(); ++k) {
+            worst = std::max(worst, std::hypot(x[k][0] - exact[k][0], x[k][1] - exact[k][1]));
+        }
+        return worst;
+    };
+    return std::log2(error(h) / error(h / 2));
+}
+
+TEST(Rosenbrock, SamplesAreOfOrderFour)
+{
+    EXPECT_NEAR(observed_order_of_samples(Pendulum(), {1, 0}, 0.05), 4, 0.2);
+    EXPECT_NEAR(
+        observed_order_of_samples(ImpactOscillator({.frequency = 3, .wall = 10}), {0.3, 0}, 0.02),
+        4, 0.2);
+}
+
+/// x' = -rate (x - cos t).
+struct Drawn {
+    using State = std::array<double, 1>;
+    double rate;
+    template <class X>
+    void flow(const ScalarOf<X>& t, const X& x, X& dxdt) const
+    {
+        using std::cos;
+        dxdt[0] = -rate * (x[0] - cos(t));
+    }
+    [[nodiscard]] double exact(double t, double x0) const
+    {
+        const double d = 1 + rate * rate;
+        return (rate * rate * std::cos(t) + rate * std::sin(t)) / d +
+               (x0 - rate * rate / d) * std::exp(-rate * t);
+    }
+};
+
+// Steps that end at the samples are wrong by up to 9 tolerances here, where the order of a method
+// is reduced in stiff components, and the cubic of a step by up to 28 000.
+TEST(Rosenbrock, SamplesOfStiffComponentsAreAsAccurateAsSteps)
+{
+    std::vector<double> times = sample_times(4, 200);
+    for (const double rate : {1.0, 50.0, 1e4, 1e6}) {
+        for (const double x0 : {1.0, 0.0}) {
+            for (const double rtol : {1e-3, 1e-5, 1e-7}) {
+                const Drawn system{rate};
+                const auto run = integrate(
+                    system, {x0}, {.t_end = 4, .rtol = rtol, .atol = rtol, .sample_times = times},
+                    Stiff{});
+                ASSERT_EQ(run.trajectory.t.size(), times.size());
+                for (std::size_t k = 0; k < times.size(); ++k) {
+                    EXPECT_NEAR(run.trajectory.x[k][0], system.exact(times[k], x0), 10 * rtol)
+                        << rate << ' ' << x0 << ' ' << rtol << ' ' << times[k];
+                }
+            }
+        }
+    }
+}
+
+// A decay by 1e4 a second from 1 to 0 in a first step of any length; samples lie in it.
+TEST(Rosenbrock, SamplesFollowATransient)
+{
+    const Drawn system{1e4};
+    std::vector<double> times;
+    for (int k = 1; k <= 60; ++k) times.push_back(1e-6 * std::pow(1.2, k));
+    for (const double rtol : {1e-2, 1e-4, 1e-6}) {
+        const auto run =
+            integrate(system, {0.0},
+                      {.t_end = 1, .rtol = rtol, .atol = rtol, .sample_times = times}, Stiff{});
+        for (std::size_t k = 0; k < times.size(); ++k) {
+            EXPECT_NEAR(run.trajectory.x[k][0], system.exact(times[k], 0), 4 * rtol) << times[k];
+        }
+    }
+}
+
+// A step with samples takes one call of the flow more, and each sample one; without a
+// factorization, and without a call for the Jacobian, which is of the step.
+TEST(Rosenbrock, SamplesCostACallEach)
+{
+    const Options options{.t_end = 4, .rtol = 1e-6, .atol = 1e-6};
+    Options sampled = options;
+    sampled.sample_times = sample_times(4, 300);
+    const auto run = integrate(Drawn{50}, {0.9}, options, Stiff{});
+    const auto with = integrate(Drawn{50}, {0.9}, sampled, Stiff{});
+    EXPECT_EQ(run.x, with.x);
+    EXPECT_EQ(run.statistics.steps, with.statistics.steps);
+    EXPECT_LE(with.statistics.flow_calls,
+              run.statistics.flow_calls + run.statistics.steps + sampled.sample_times.size());
+    EXPECT_EQ(with.statistics.resteps, 0u);
+}
+
+// A sample at the end of a step is that end.
+TEST(Rosenbrock, ASampleAtTheEndHasItsBits)
+{
+    const auto run =
+        integrate(Pendulum(), {1.0, 0.0},
+                  {.t_end = 1.5, .rtol = 1e-6, .sample_times = {0.3, 0.7, 1.5}}, Stiff{});
+    ASSERT_EQ(run.trajectory.x.size(), 3u);
+    EXPECT_EQ(run.trajectory.x[2], run.x);
+    const std::vector<double> x{1, 0};
+    const auto large = integrate(
+        Pendulum(), x, {.t_end = 1.5, .rtol = 1e-6, .sample_times = {0.3, 0.7, 1.5}}, Stiff{});
+    for (std::size_t k = 0; k < 3; ++k) {
+        for (std::size_t i = 0; i < 2; ++i) {
+            EXPECT_EQ(run.trajectory.x[k][i], large.trajectory.x[k][i]);
+        }
+    }
+}
+
+TEST(Rosenbrock, SamplesBackwardAreThoseOfTheMotion)
+{
+    const Drawn slow{1};
+    const double x = slow.exact(3, 0.5);
+    const auto run = integrate(slow, {x},
+                               {.t_start = 3,
+                                .t_end = 0,
+                                .rtol = 1e-7,
+                                .atol = 1e-7,
+                                .sample_times = {2.71, 2.03, 1.13, 0.77, 0.31, 0}},
+                               Stiff{});
+    ASSERT_EQ(run.trajectory.x.size(), 6u);
+    for (std::size_t k = 0; k < 6; ++k) {  // errors grow by e^3 = 20
+        EXPECT_NEAR(run.trajectory.x[k][0], slow.exact(run.trajectory.t[k], 0.5), 1e-5);
     }
 }
 

@@ -140,6 +140,11 @@ struct StepKernel {
     double (*reach)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
     /// w(s) on an interpolant of the method's own, or null.
     void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;
+    /// w(s) for a sample, on an interpolant of the order of the method that takes further work
+    /// once a step. False where that is not within the tolerance, and the sample needs a step of
+    /// its own. Null: the method has none.
+    bool (*sample)(void* door, StepState<X>& step, double s, double rtol, double atol,
+                   X& w) = nullptr;
     /// The current step where it is a power series, or null.
     SeriesTerms (*series)(void* door, const StepState<X>& step) = nullptr;
     /// Largest error of the current step's polynomial inside the step, over atol + rtol max(|x0|,
