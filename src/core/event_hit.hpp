@@ -70,6 +70,7 @@ struct Hit {
     Side side = Side::plateau;  ///< the side that the guard leaves
     Finding finding;
     double guess = 0;  ///< [s] estimated offset of the root
+    bool departed = false;  ///< it is to be located
     bool located = false;
     Location where;
 };

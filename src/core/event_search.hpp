@@ -493,6 +493,7 @@ private:
         return std::isfinite(root) ? root : finding.hi.s;
     }
 
+    /// Locates a candidate, and keeps the state at its root if it is the first so far.
     void locate(const CurrentStep& step, Bank& bank, Hit& hit, std::uint64_t& calls)
     {
         const auto guard = bank.view(hit.guard, step.mode(), calls);
@@ -500,6 +501,9 @@ private:
         probe.watch(hit.side);
         hit.where = find(probe, hit.finding, bank, hit.guard).value();
         hit.located = true;
+        if (first_ && first_->where.root <= hit.where.root) return;
+        first_ = &hit;
+        assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
     }
 
     /// First set if guard i is the only one that needs a check. The code that nearly
@@ -567,12 +571,12 @@ private:
     /// The first set among several candidates.
     [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
 
-    /// Locates the only guard of the set, and keeps the state at its root.
-    void locate_alone(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
-
     /// Locates candidates until every one that has left its side by the end of the
     /// window is located; the set is those that lie in the window.
     void close_set(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
+
+    /// Finds out which of the candidates that are not located have left their sides by offset `at`.
+    void find_departed(const CurrentStep& step, Bank& bank, double at, std::uint64_t& calls);
 
     [[nodiscard]] double window_end(const CurrentStep& step) noexcept;
 
@@ -583,6 +587,7 @@ private:
     ProbeSpace<X> space_;
     X before_;
     GuardList<Hit, single> hits_;
+    const Hit* first_ = nullptr;  ///< of several candidates; `before_` is the state at its root
     GuardList<std::size_t, single> fired_;
     std::vector<Note> notes_;
     std::vector<X> states_;  ///< of notes
