@@ -42,6 +42,7 @@ public:
         : finders_(&finders),
           space_(like),
           before_(like),
+          rate_(like),
           hits_(guards),
           fired_(guards),
           resolution_(resolution),
@@ -235,7 +236,7 @@ private:
     {
         if (space_.x.size() != like.size()) {
             space_ = ProbeSpace<X>(like);
-            before_ = like;
+            before_ = rate_ = like;
         }
     }
 
@@ -501,9 +502,15 @@ private:
         probe.watch(hit.side);
         hit.where = find(probe, hit.finding, bank, hit.guard).value();
         hit.located = true;
-        if (first_ && first_->where.root <= hit.where.root) return;
+        if (first_ && first_->where.root <= hit.where.root) {
+            // Which of two equal roots is kept must not matter.
+            if (first_->where.root == hit.where.root) goes_straight_ = false;
+            return;
+        }
         first_ = &hit;
         assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
+        goes_straight_ = probe.is_settled() && !hit.where.jump;
+        if (goes_straight_ && hits_.size() > 1) assign(rate_, space_.dxdt);
     }
 
     /// First set if guard i is the only one that needs a check. The code that nearly
@@ -578,6 +585,10 @@ private:
     /// Finds out which of the candidates that are not located have left their sides by offset `at`.
     void find_departed(const CurrentStep& step, Bank& bank, double at, std::uint64_t& calls);
 
+    /// Computes the state at offset s, near the first root, for which it needs no repeat of the
+    /// step if the motion is straight until there.
+    void place(const CurrentStep& step, double s, X& x);
+
     [[nodiscard]] double window_end(const CurrentStep& step) noexcept;
 
     /// The set happens at its latest root, or at the time event that it belongs to.
@@ -586,8 +597,10 @@ private:
     const Finders<X>* finders_;
     ProbeSpace<X> space_;
     X before_;
+    X rate_;
     GuardList<Hit, single> hits_;
     const Hit* first_ = nullptr;  ///< of several candidates; `before_` is the state at its root
+    bool goes_straight_ = false;  ///< and `rate_` the flow there
     GuardList<std::size_t, single> fired_;
     std::vector<Note> notes_;
     std::vector<X> states_;  ///< of notes

@@ -60,10 +60,21 @@ inline void EventSearch<X, single>::find_departed(const CurrentStep& step, Bank&
         if (hit.located) continue;
         hit.departed = hit.finding.hi.s <= at;
         if (hit.departed) continue;
-        if (!placed) step.restep(at, space_.x);
+        if (!placed) place(step, at, space_.x);
         placed = true;
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         hit.departed = has_left(hit.side, guard.value(step.time(at), space_.x));
+    }
+}
+
+template <class X, bool single>
+inline void EventSearch<X, single>::place(const CurrentStep& step, double s, X& x)
+{
+    const double ahead = s - first_->where.root;
+    if (goes_straight_ && std::fabs(ahead) <= straight_part * step.h()) {
+        move(x, before_, ahead, rate_);
+    } else {
+        step.restep(s, x);
     }
 }
 
@@ -91,7 +102,7 @@ inline void EventSearch<X, single>::settle_place(const CurrentStep& step, bool t
         if (at_ == 0) {
             assign(before_, step.x0());
         } else {
-            step.restep(at_, before_);
+            place(step, at_, before_);
         }
     }
     if (time_event_due && at_ + resolution_.window(step.time(at_)) >= step.h()) {

@@ -40,8 +40,6 @@ double hermite_root(double v0, double r0, double v1, double r1, double sign) noe
 
 namespace {
 
-/// Largest fraction of a bracket over which the flow may be extrapolated: its square is 9e-16.
-constexpr double straight_part = 3e-8;
 /// Number of consecutive corrections that may fail to halve the one before.
 constexpr int most_linear = 4;
 

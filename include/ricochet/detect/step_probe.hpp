@@ -87,6 +87,9 @@ struct Location {
     return std::numeric_limits<double>::epsilon() * std::max(std::fabs(s), 0x1p-20 * std::fabs(h));
 }
 
+/// Largest fraction of a step over which the flow may be extrapolated: its square is 9e-16.
+inline constexpr double straight_part = 3e-8;
+
 /// Work space for the states of a probe, so that probing allocates nothing.
 template <class X>
 struct ProbeSpace {
@@ -252,6 +255,9 @@ public:
         if (!(placed_ == where.root)) place(where.root);
         return space_->x;
     }
+
+    /// Whether the root that a locator found last lies on the line along the flow in the work space.
+    [[nodiscard]] bool is_settled() const noexcept { return settled_; }
 
     void complete(GuardSample& sample) override
     {
