@@ -394,8 +394,10 @@ private:
         }
         const double tolerance = std::max(resolution_.tolerance(probe.step().time(finding.hi.s)),
                                           bank.unresolved(i, probe.step().h()));
-        if (!bank[i].info.boolean)
+        if (!bank[i].info.boolean) {
+            if (bank.is_cubic(i, probe.step().h())) probe.take_as_cubic();
             return finders_->locate(probe, finding.lo, finding.hi, tolerance);
+        }
         // A boolean guard always jumps.
         Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
         where.jump = false;
@@ -527,6 +529,7 @@ private:
             bank.is_plain(i, step.h()) &&
             finders_->leaves_plainly(sign_of(side), start, end, bank.touch(i, step.h()))) {
             probe.watch(side);
+            if (bank.is_cubic(i, step.h())) probe.take_as_cubic();
             const double tolerance =
                 std::max(resolution_.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
             const Location where = finders_->locate(probe, start, end, tolerance);

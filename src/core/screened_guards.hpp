@@ -186,6 +186,13 @@ public:
         return 0x1p16 * deviation(look, i) <= look.size();
     }
 
+    /// Whether guard i differs in the step from the cubic through its ends by so little that their
+    /// roots lie within a millionth of the step, as far as it has been evaluated.
+    [[nodiscard]] bool is_cubic(std::size_t i, double h) const noexcept
+    {
+        return checked() && 0x1p20 * deviation(cubic(i, h), i) <= std::fabs(g1_[i] - g0_[i]);
+    }
+
     /// Whether the guards have been evaluated inside the step.
     [[nodiscard]] bool checked() const noexcept { return checked_ != Checked::not_at_all; }
 

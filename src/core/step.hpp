@@ -259,6 +259,11 @@ public:
         for_components([&](auto i) { dxdt[i] = rate[i]; });
     }
 
+    /// Whether the method has an interpolant of its own.
+    [[nodiscard]] bool interpolates() const noexcept
+    {
+        return kernel_->interpolates() && !state_.host;
+    }
     [[nodiscard]] bool is_hosts() const noexcept { return state_.host; }
     /// Whether a host's path is the cubic through the states and rates at the ends.
     [[nodiscard]] bool is_hosts_cubic() const noexcept
