@@ -251,6 +251,7 @@ public:
     }
 
 protected:
+    using Guards::at_rest_;
     using Guards::records_;
     using Guards::rules_;
     using Guards::sample_values;
