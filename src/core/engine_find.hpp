@@ -40,7 +40,7 @@ inline bool EventEngine<X, single>::is_suspicious(bool hardly_moves)
         return bank_.suspicious(step_.h());
     }
     if (!bank_.doubtful(step_.h())) return false;
-    if (bank_.needs_second_check(step_.h())) {
+    if (bank_.needs_second_check(step_.h()) && !bank_.sample_doubtful_further(step_, calls())) {
         X& x = search_.space(step_.x0());
         step_.peek(CubicCheck::further * step_.h(), x);
         bank_.sample_further(step_, x, calls());

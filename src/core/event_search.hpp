@@ -118,7 +118,7 @@ public:
         hits_.clear();
         fired_.clear();
         evidence_ = finders_->detector.evidence;
-        late_ = false;
+        late_ = rated_at_set_ = false;
         std::size_t suspects = 0;
         std::size_t last = 0;
         for (const std::size_t i : bank.suspects()) {
@@ -183,10 +183,25 @@ public:
         const double t = step.time(at_);
         GuardSample sample{.s = at_, .value = guard.value(t, before_)};
         if (!bank[i].info.boolean) {
-            step.flow(at_, before_, space_.dxdt);
-            sample.rate = guard.rate(t, before_, space_.dxdt, step.h());
+            if (!rated_at_set_) step.flow(at_, before_, rate_);
+            rated_at_set_ = true;
+            sample.rate = guard.rate(t, before_, rate_, step.h());
         }
         return sample;
+    }
+
+    /// Whether guard i is a candidate that was still so far from its surface at the end of the
+    /// window that its event is another one.
+    [[nodiscard]] bool comes_later(const CurrentStep& step, const Bank& bank,
+                                   std::size_t i) noexcept
+    {
+        for (const Hit& hit : hits_) {
+            if (hit.guard != i) continue;
+            // Its rate there is at most a few times its size over the step.
+            const double moves = bank.scale(i, step.h()) / step.h() * reach_of(step, at_);
+            return !hit.departed && !hit.located && std::fabs(hit.value) > 64 * moves;
+        }
+        return false;
     }
 
     /// Whether a guard crosses its surface with the set, that is, lies within rounding of it
@@ -194,9 +209,7 @@ public:
     [[nodiscard]] bool crosses_with_set(const CurrentStep& step, const Bank& bank, std::size_t i,
                                         const GuardSample& sample) const
     {
-        // The rounding of a step of length s moves an event by a few ulp(s).
-        const double rounding = 64 * std::numeric_limits<double>::epsilon() * sample.s;
-        const double reach = std::max(resolution_.blur(step.time(sample.s)), rounding);
+        const double reach = reach_of(step, sample.s);
         // A guard that acts must be located in the set; one that is only recorded may be as far
         // from its surface as the rounding of its largest values.
         const double band = bank[i].acting ? 0 : bank.touch(i, step.h());
@@ -230,6 +243,14 @@ public:
     std::uint64_t disabled = 0;
 
 private:
+    /// Distance in time [s] over which an event at offset s is not certain: the rounding of a step
+    /// of length s moves it by a few ulp(s).
+    [[nodiscard]] double reach_of(const CurrentStep& step, double s) const noexcept
+    {
+        const double rounding = 64 * std::numeric_limits<double>::epsilon() * s;
+        return std::max(resolution_.blur(step.time(s)), rounding);
+    }
+
     static constexpr int most_rounds = 1'000'000;
 
     void fit(const X& like)
@@ -455,9 +476,32 @@ private:
              probe);
     }
 
+    /// Whether guard i leaves its side once in the step, as plainly as its samples can show.
+    [[nodiscard, gnu::always_inline]] bool goes_plainly(const Bank& bank, std::size_t i,
+                                                        double h) const
+    {
+        const Side side = bank[i].side;
+        return bank[i].from == 0 && !bank[i].info.boolean && counts(side, bank[i].info.crossing) &&
+               bank.is_plain(i, h) &&
+               finders_->leaves_plainly(sign_of(side), bank.start(i), bank.end(i, h),
+                                        bank.touch(i, h));
+    }
+
+    void add_hit(std::size_t i, const Finding& finding) noexcept
+    {
+        Hit hit;
+        hit.guard = i;
+        hit.side = finding.side;
+        hit.finding = finding;
+        hits_.push_back(hit);
+    }
+
     /// Adds a hit of an acting guard, and its touches before it.
     void examine(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
+        if (goes_plainly(bank, i, step.h())) {
+            return add_hit(i, Finding::leaving(bank[i].side, bank.start(i), bank.end(i, step.h())));
+        }
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {
@@ -474,12 +518,7 @@ private:
                 }
             }
             late_ = late_ || finding.late;
-            Hit hit;
-            hit.guard = i;
-            hit.side = finding.side;
-            hit.finding = finding;
-            hits_.push_back(hit);
-            return;
+            return add_hit(i, finding);
         }
     }
 
@@ -512,7 +551,7 @@ private:
         first_ = &hit;
         assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
         goes_straight_ = probe.is_settled() && !hit.where.jump;
-        if (goes_straight_ && hits_.size() > 1) assign(rate_, space_.dxdt);
+        if (goes_straight_) assign(rate_, space_.dxdt);
     }
 
     /// First set if guard i is the only one that needs a check. The code that nearly
@@ -525,9 +564,7 @@ private:
         Probe probe(guard, step, space_);
         const Side side = bank[i].side;
         const GuardSample start = bank.start(i), end = bank.end(i, step.h());
-        if (bank[i].from == 0 && !bank[i].info.boolean && counts(side, guard.crossing()) &&
-            bank.is_plain(i, step.h()) &&
-            finders_->leaves_plainly(sign_of(side), start, end, bank.touch(i, step.h()))) {
+        if (goes_plainly(bank, i, step.h())) {
             probe.watch(side);
             if (bank.is_cubic(i, step.h())) probe.take_as_cubic();
             const double tolerance =
@@ -604,6 +641,7 @@ private:
     GuardList<Hit, single> hits_;
     const Hit* first_ = nullptr;  ///< of several candidates; `before_` is the state at its root
     bool goes_straight_ = false;  ///< and `rate_` the flow there
+    bool rated_at_set_ = false;   ///< `rate_` is the flow at the set
     GuardList<std::size_t, single> fired_;
     std::vector<Note> notes_;
     std::vector<X> states_;  ///< of notes

@@ -18,6 +18,7 @@ inline bool EventSearch<X, single>::find_among(const CurrentStep& step, Bank& ba
     if (fired_.size() == 1) {
         at_ = first_->where.root;
         at_remainder_ = first_->where.root_remainder;
+        rated_at_set_ = goes_straight_;
     }
     return true;
 }
@@ -63,7 +64,8 @@ inline void EventSearch<X, single>::find_departed(const CurrentStep& step, Bank&
         if (!placed) place(step, at, space_.x);
         placed = true;
         const auto guard = bank.view(hit.guard, step.mode(), calls);
-        hit.departed = has_left(hit.side, guard.value(step.time(at), space_.x));
+        hit.value = guard.value(step.time(at), space_.x);
+        hit.departed = has_left(hit.side, hit.value);
     }
 }
 
@@ -108,6 +110,7 @@ inline void EventSearch<X, single>::settle_place(const CurrentStep& step, bool t
     if (time_event_due && at_ + resolution_.window(step.time(at_)) >= step.h()) {
         at_ = step.h();
         at_remainder_ = 0;
+        rated_at_set_ = false;
         assign(before_, step.x1());
     }
 }

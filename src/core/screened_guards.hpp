@@ -5,6 +5,7 @@
 // are screened in one loop.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -94,6 +95,24 @@ public:
         checked_ = Checked::further;
     }
 
+    /// The same for the guards in doubt alone, if they are few, on the step's polynomial. The
+    /// others count as being on their cubics there.
+    [[nodiscard]] bool sample_doubtful_further(const Step<X>& step, std::uint64_t& calls)
+    {
+        if (are_few() || !marked_ || marks_.size() > size() / 4 || !system_->guard_on) return false;
+        if (!step.interpolates()) return false;
+        const double s = CubicCheck::further * step.h();
+        for (std::size_t i = 0; i < size(); ++i) {
+            further_[i] = cubic(i, step.h()).at(CubicCheck::further);
+        }
+        const auto x = step.template component_view<false>(s);
+        for (const std::size_t i : marks_) {
+            further_[i] = this->view(i, step.mode(), calls).value(step.time(s), x);
+        }
+        checked_ = Checked::further;
+        return true;
+    }
+
     /// Evaluates them once more, at the part `u` of the step, one of `CubicCheck::places`.
     void sample_place(const Step<X>& step, double u, const X& x, std::uint64_t& calls)
     {
@@ -147,10 +166,14 @@ public:
     /// if the first agreed with the cubic to nine digits, which is no coincidence.
     [[nodiscard]] bool needs_second_check(double h) const noexcept
     {
-        for (std::size_t i = 0; i < size(); ++i) {
+        const auto needs = [this, h](std::size_t i) {
             const CubicCheck look = cubic(i, h);
             const double e = look.deviation(CubicCheck::inside, inside_[i]);
-            if (sign_[i] != 0 && !(0x1p30 * e <= look.size())) return true;
+            return sign_[i] != 0 && !(0x1p30 * e <= look.size());
+        };
+        if (marked_) return std::any_of(marks_.begin(), marks_.end(), needs);
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (needs(i)) return true;
         }
         return false;
     }
@@ -255,6 +278,7 @@ protected:
     using Guards::records_;
     using Guards::rules_;
     using Guards::sample_values;
+    using Guards::system_;
 
     /// Places in the current step at which the guards have been evaluated.
     enum class Checked : std::uint8_t { not_at_all, inside, further, everywhere };
