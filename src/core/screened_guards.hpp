@@ -40,6 +40,8 @@ protected:
         for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_}) numbers->resize(size());
         for (const GuardRecord& record : records_) {
             bands_ = bands_ || record.info.touch > 0;
+            const int degree = record.info.degree;
+            of_time_ = of_time_ && degree >= 1 && degree <= 3 && !record.info.boolean;
             linear_ = linear_ && record.info.degree == 1 && !record.info.boolean;
         }
         linear_ = linear_ && !bands_ && rules.screening == Screening::extremum;
@@ -146,6 +148,9 @@ public:
             return !(clear & known) & armed;
         });
     }
+
+    /// Whether all guards are the cubics through their ends in a step in which only the time moves.
+    [[nodiscard]] bool are_cubics_of_time() const noexcept { return of_time_; }
 
     /// Whether any guard needs a second evaluation inside the step, or a search.
     [[nodiscard]] bool doubtful(double h) noexcept
@@ -526,6 +531,7 @@ protected:
     bool starts_phase_ = false;
     bool waiting_ = false;      ///< whether any guard may be on a plateau
     bool bands_ = false;        ///< whether any guard declares a tolerance for touches
+    bool of_time_ = true;       ///< whether all guards are of degree 3 or less
     bool linear_ = true;        ///< whether all guards are of degree 1, and are screened as such
     bool screened_ = false;     ///< whether `suspects_` belongs to the current step
     bool as_screened_ = false;  ///< and no guard has changed since then

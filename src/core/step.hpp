@@ -264,6 +264,17 @@ public:
     {
         return kernel_->interpolates() && !state_.host;
     }
+    /// Whether only the time moves in the step: what `peek` sees is the start.
+    [[nodiscard]] bool stands() const noexcept
+    {
+        if (kernel_->interpolates() || state_.host) return false;
+        bool stands = true;
+        for_components([&](auto i) {
+            stands = stands && state_.x1[i] == state_.x0[i] && state_.rate0[i] == 0 &&
+                     state_.rate1[i] == 0;
+        });
+        return stands;
+    }
     [[nodiscard]] bool is_hosts() const noexcept { return state_.host; }
     /// Whether a host's path is the cubic through the states and rates at the ends.
     [[nodiscard]] bool is_hosts_cubic() const noexcept
