@@ -236,7 +236,7 @@ public:
         kernel_->depart(system_.door(), state_, s, x, dxdt);
         add_tangent(s, x);
         if (kernel_->end_rate) {
-            for_components([&](auto i) { dxdt[i] += state_.rate0[i]; });
+            detail::move(dxdt, dxdt, 1, state_.rate0);
         } else {
             flow(s, x, dxdt);
         }
@@ -585,6 +585,10 @@ private:
     /// From w to x at offset s.
     void add_tangent(double s, X& w) const noexcept
     {
+        if constexpr (LongArray<X>) {
+            return add_tangent_many(w.data(), state_.x0.data(), s, state_.rate0.data(),
+                                    state_.remainder.data(), w.size());
+        }
         for_components([&](auto i) {
             w[i] = state_.x0[i] + (s * state_.rate0[i] + (w[i] + state_.remainder[i]));
         });
