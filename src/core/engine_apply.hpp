@@ -10,7 +10,7 @@ inline void EventEngine<X, single>::cut_short()
 {
     const double s = search_.at();
     const double t = on_time_ ? time_event_ : time_of_set();
-    for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
+    bank_.forget_bands();
     note_crossings_to_set();
     mode_before_ = step_.mode();
     for (const std::size_t i : search_.fired()) find_band(i, t);
@@ -93,7 +93,7 @@ inline void EventEngine<X, single>::find_time_event(bool at_start)
 template <class X, bool single>
 inline void EventEngine<X, single>::apply_time_event()
 {
-    for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].band = 0;
+    bank_.forget_bands();
     search_.fired().clear();
     assign(search_.before(), step_.x0());
     transform(true);

@@ -31,16 +31,18 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::is_suspicious(bool hardly_moves)
 {
     if (!bank_.checked()) return bank_.suspicious(step_.h());
-    if (hardly_moves) {
+    const bool stands = hardly_moves && step_.stands();
+    if (hardly_moves && !(stands && bank_.are_cubics_of_time())) {
         X& x = search_.space(step_.x0());
+        if (stands) assign(x, step_.x0());
         for (const double u : CubicCheck::places) {
-            step_.peek(u * step_.h(), x);
+            if (!stands) step_.peek(u * step_.h(), x);
             bank_.sample_place(step_, u, x, calls());
         }
         return bank_.suspicious(step_.h());
     }
     if (!bank_.doubtful(step_.h())) return false;
-    if (bank_.needs_second_check(step_.h())) {
+    if (bank_.needs_second_check(step_.h()) && !bank_.sample_doubtful_further(step_, calls())) {
         X& x = search_.space(step_.x0());
         step_.peek(CubicCheck::further * step_.h(), x);
         bank_.sample_further(step_, x, calls());

@@ -22,6 +22,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
     bank_.complete_rates(step_, calls());
     for (const std::size_t i : bank_.suspects()) {
         GuardRecord& record = bank_[i];
+        if (record.from == 0 && search_.comes_later(step_, bank_, i)) continue;
         if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;
         const GuardSample at = search_.sample_at_set(step_, bank_, i, calls());
         constexpr double epsilon = std::numeric_limits<double>::epsilon();

@@ -101,8 +101,10 @@ template <class X, bool single>
 inline void EventEngine<X, single>::enable_guards()
 {
     for (std::size_t i = 0; i < bank_.size(); ++i) {
-        GuardRecord& record = bank_[i];
         const bool enabled = system_.enabled_in(i, step_.mode());
+        const GuardRecord& now = std::as_const(bank_)[i];
+        if (enabled == now.enabled && !now.newly_enabled) continue;
+        GuardRecord& record = bank_[i];
         record.newly_enabled = enabled && !record.enabled;
         if (record.newly_enabled) record.last = std::numeric_limits<double>::quiet_NaN();
         record.enabled = enabled;
@@ -114,7 +116,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::arm_all()
 {
     double widest = 0;
-    for (std::size_t i = 0; i < bank_.size(); ++i) bank_[i].fired = false;
+    bank_.forget_fired();
     for (const std::size_t i : search_.fired()) {
         bank_[i].fired = true;
         widest = std::max(widest, bank_[i].band);
@@ -127,14 +129,15 @@ inline void EventEngine<X, single>::arm_all()
     last_h_ = h_next_;
     bank_.begin_phase(step_.time(0));
     bank_.sample_start(step_, calls(), h_next_);
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
+    bool goes_on = true;
+    bank_.for_each_to_arm([&](std::size_t i) {
+        if (!goes_on) return;
         if (!bank_[i].enabled) {
             bank_.arm(i, Side::plateau);
-            continue;
+        } else if (single || !bank_.stays_armed(i)) {
+            goes_on = arm_one(i, widest);
         }
-        if (!single && bank_.stays_armed(i)) continue;
-        if (!arm_one(i, widest)) return;
-    }
+    });
 }
 
 template <class X, bool single>

@@ -69,7 +69,9 @@ struct Hit {
     std::size_t guard = 0;
     Side side = Side::plateau;  ///< the side that the guard leaves
     Finding finding;
-    double guess = 0;  ///< [s] estimated offset of the root
+    double guess = 0;       ///< [s] estimated offset of the root
+    bool departed = false;  ///< it is to be located
+    double value = 0;       ///< else the guard at the end of the window
     bool located = false;
     Location where;
 };

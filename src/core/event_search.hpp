@@ -42,6 +42,7 @@ public:
         : finders_(&finders),
           space_(like),
           before_(like),
+          rate_(like),
           hits_(guards),
           fired_(guards),
           resolution_(resolution),
@@ -117,7 +118,7 @@ public:
         hits_.clear();
         fired_.clear();
         evidence_ = finders_->detector.evidence;
-        late_ = false;
+        late_ = rated_at_set_ = false;
         std::size_t suspects = 0;
         std::size_t last = 0;
         for (const std::size_t i : bank.suspects()) {
@@ -182,10 +183,25 @@ public:
         const double t = step.time(at_);
         GuardSample sample{.s = at_, .value = guard.value(t, before_)};
         if (!bank[i].info.boolean) {
-            step.flow(at_, before_, space_.dxdt);
-            sample.rate = guard.rate(t, before_, space_.dxdt, step.h());
+            if (!rated_at_set_) step.flow(at_, before_, rate_);
+            rated_at_set_ = true;
+            sample.rate = guard.rate(t, before_, rate_, step.h());
         }
         return sample;
+    }
+
+    /// Whether guard i is a candidate that was still so far from its surface at the end of the
+    /// window that its event is another one.
+    [[nodiscard]] bool comes_later(const CurrentStep& step, const Bank& bank,
+                                   std::size_t i) noexcept
+    {
+        for (const Hit& hit : hits_) {
+            if (hit.guard != i) continue;
+            // Its rate there is at most a few times its size over the step.
+            const double moves = bank.scale(i, step.h()) / step.h() * reach_of(step, at_);
+            return !hit.departed && !hit.located && std::fabs(hit.value) > 64 * moves;
+        }
+        return false;
     }
 
     /// Whether a guard crosses its surface with the set, that is, lies within rounding of it
@@ -193,9 +209,7 @@ public:
     [[nodiscard]] bool crosses_with_set(const CurrentStep& step, const Bank& bank, std::size_t i,
                                         const GuardSample& sample) const
     {
-        // The rounding of a step of length s moves an event by a few ulp(s).
-        const double rounding = 64 * std::numeric_limits<double>::epsilon() * sample.s;
-        const double reach = std::max(resolution_.blur(step.time(sample.s)), rounding);
+        const double reach = reach_of(step, sample.s);
         // A guard that acts must be located in the set; one that is only recorded may be as far
         // from its surface as the rounding of its largest values.
         const double band = bank[i].acting ? 0 : bank.touch(i, step.h());
@@ -229,13 +243,21 @@ public:
     std::uint64_t disabled = 0;
 
 private:
+    /// Distance in time [s] over which an event at offset s is not certain: the rounding of a step
+    /// of length s moves it by a few ulp(s).
+    [[nodiscard]] double reach_of(const CurrentStep& step, double s) const noexcept
+    {
+        const double rounding = 64 * std::numeric_limits<double>::epsilon() * s;
+        return std::max(resolution_.blur(step.time(s)), rounding);
+    }
+
     static constexpr int most_rounds = 1'000'000;
 
     void fit(const X& like)
     {
         if (space_.x.size() != like.size()) {
             space_ = ProbeSpace<X>(like);
-            before_ = like;
+            before_ = rate_ = like;
         }
     }
 
@@ -393,8 +415,10 @@ private:
         }
         const double tolerance = std::max(resolution_.tolerance(probe.step().time(finding.hi.s)),
                                           bank.unresolved(i, probe.step().h()));
-        if (!bank[i].info.boolean)
+        if (!bank[i].info.boolean) {
+            if (bank.is_cubic(i, probe.step().h())) probe.take_as_cubic();
             return finders_->locate(probe, finding.lo, finding.hi, tolerance);
+        }
         // A boolean guard always jumps.
         Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
         where.jump = false;
@@ -452,9 +476,32 @@ private:
              probe);
     }
 
+    /// Whether guard i leaves its side once in the step, as plainly as its samples can show.
+    [[nodiscard, gnu::always_inline]] bool goes_plainly(const Bank& bank, std::size_t i,
+                                                        double h) const
+    {
+        const Side side = bank[i].side;
+        return bank[i].from == 0 && !bank[i].info.boolean && counts(side, bank[i].info.crossing) &&
+               bank.is_plain(i, h) &&
+               finders_->leaves_plainly(sign_of(side), bank.start(i), bank.end(i, h),
+                                        bank.touch(i, h));
+    }
+
+    void add_hit(std::size_t i, const Finding& finding) noexcept
+    {
+        Hit hit;
+        hit.guard = i;
+        hit.side = finding.side;
+        hit.finding = finding;
+        hits_.push_back(hit);
+    }
+
     /// Adds a hit of an acting guard, and its touches before it.
     void examine(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
+        if (goes_plainly(bank, i, step.h())) {
+            return add_hit(i, Finding::leaving(bank[i].side, bank.start(i), bank.end(i, step.h())));
+        }
         const auto guard = bank.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {
@@ -471,12 +518,7 @@ private:
                 }
             }
             late_ = late_ || finding.late;
-            Hit hit;
-            hit.guard = i;
-            hit.side = finding.side;
-            hit.finding = finding;
-            hits_.push_back(hit);
-            return;
+            return add_hit(i, finding);
         }
     }
 
@@ -493,6 +535,7 @@ private:
         return std::isfinite(root) ? root : finding.hi.s;
     }
 
+    /// Locates a candidate, and keeps the state at its root if it is the first so far.
     void locate(const CurrentStep& step, Bank& bank, Hit& hit, std::uint64_t& calls)
     {
         const auto guard = bank.view(hit.guard, step.mode(), calls);
@@ -500,6 +543,15 @@ private:
         probe.watch(hit.side);
         hit.where = find(probe, hit.finding, bank, hit.guard).value();
         hit.located = true;
+        if (first_ && first_->where.root <= hit.where.root) {
+            // Which of two equal roots is kept must not matter.
+            if (first_->where.root == hit.where.root) goes_straight_ = false;
+            return;
+        }
+        first_ = &hit;
+        assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
+        goes_straight_ = probe.is_settled() && !hit.where.jump;
+        if (goes_straight_) assign(rate_, space_.dxdt);
     }
 
     /// First set if guard i is the only one that needs a check. The code that nearly
@@ -512,10 +564,9 @@ private:
         Probe probe(guard, step, space_);
         const Side side = bank[i].side;
         const GuardSample start = bank.start(i), end = bank.end(i, step.h());
-        if (bank[i].from == 0 && !bank[i].info.boolean && counts(side, guard.crossing()) &&
-            bank.is_plain(i, step.h()) &&
-            finders_->leaves_plainly(sign_of(side), start, end, bank.touch(i, step.h()))) {
+        if (goes_plainly(bank, i, step.h())) {
             probe.watch(side);
+            if (bank.is_cubic(i, step.h())) probe.take_as_cubic();
             const double tolerance =
                 std::max(resolution_.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
             const Location where = finders_->locate(probe, start, end, tolerance);
@@ -567,12 +618,16 @@ private:
     /// The first set among several candidates.
     [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
 
-    /// Locates the only guard of the set, and keeps the state at its root.
-    void locate_alone(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
-
     /// Locates candidates until every one that has left its side by the end of the
     /// window is located; the set is those that lie in the window.
     void close_set(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
+
+    /// Finds out which of the candidates that are not located have left their sides by offset `at`.
+    void find_departed(const CurrentStep& step, Bank& bank, double at, std::uint64_t& calls);
+
+    /// Computes the state at offset s, near the first root, for which it needs no repeat of the
+    /// step if the motion is straight until there.
+    void place(const CurrentStep& step, double s, X& x);
 
     [[nodiscard]] double window_end(const CurrentStep& step) noexcept;
 
@@ -582,7 +637,11 @@ private:
     const Finders<X>* finders_;
     ProbeSpace<X> space_;
     X before_;
+    X rate_;
     GuardList<Hit, single> hits_;
+    const Hit* first_ = nullptr;  ///< of several candidates; `before_` is the state at its root
+    bool goes_straight_ = false;  ///< and `rate_` the flow there
+    bool rated_at_set_ = false;   ///< `rate_` is the flow at the set
     GuardList<std::size_t, single> fired_;
     std::vector<Note> notes_;
     std::vector<X> states_;  ///< of notes

@@ -15,29 +15,19 @@ inline bool EventSearch<X, single>::find_among(const CurrentStep& step, Bank& ba
     }
     if (hits_.empty()) return false;
     close_set(step, bank, calls);
-    if (fired_.size() == 1) locate_alone(step, bank, calls);
+    if (fired_.size() == 1) {
+        at_ = first_->where.root;
+        at_remainder_ = first_->where.root_remainder;
+        rated_at_set_ = goes_straight_;
+    }
     return true;
-}
-
-template <class X, bool single>
-inline void EventSearch<X, single>::locate_alone(const CurrentStep& step, Bank& bank,
-                                                 std::uint64_t& calls)
-{
-    Hit& hit = *std::find_if(hits_.begin(), hits_.end(),
-                             [this](const Hit& candidate) { return candidate.guard == fired_[0]; });
-    const auto guard = bank.view(hit.guard, step.mode(), calls);
-    Probe probe(guard, step, space_);
-    probe.watch(hit.side);
-    hit.where = find(probe, hit.finding, bank, hit.guard).value();
-    at_ = hit.where.root;
-    at_remainder_ = hit.where.root_remainder;
-    assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
 }
 
 template <class X, bool single>
 inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& bank,
                                               std::uint64_t& calls)
 {
+    first_ = nullptr;
     double first = std::numeric_limits<double>::infinity();
     for (Hit& hit : hits_) {
         hit.guess = guess(hit.finding);
@@ -49,16 +39,9 @@ inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& ban
     double limit = window_end(step);
     for (bool changed = true; changed;) {
         changed = false;
-        const double at = std::min(limit, step.h());
-        bool placed = false;
+        find_departed(step, bank, std::min(limit, step.h()), calls);
         for (Hit& hit : hits_) {
-            if (hit.located) continue;
-            if (hit.finding.hi.s > at) {
-                if (!placed) step.restep(at, before_);
-                placed = true;
-                const auto guard = bank.view(hit.guard, step.mode(), calls);
-                if (!has_left(hit.side, guard.value(step.time(at), before_))) continue;
-            }
+            if (!hit.departed || hit.located) continue;
             locate(step, bank, hit, calls);
             changed = true;
         }
@@ -66,6 +49,34 @@ inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& ban
     }
     for (Hit& hit : hits_) {
         if (hit.located && hit.where.root <= limit) fired_.push_back(hit.guard);
+    }
+}
+
+template <class X, bool single>
+inline void EventSearch<X, single>::find_departed(const CurrentStep& step, Bank& bank, double at,
+                                                  std::uint64_t& calls)
+{
+    bool placed = false;
+    for (Hit& hit : hits_) {
+        if (hit.located) continue;
+        hit.departed = hit.finding.hi.s <= at;
+        if (hit.departed) continue;
+        if (!placed) place(step, at, space_.x);
+        placed = true;
+        const auto guard = bank.view(hit.guard, step.mode(), calls);
+        hit.value = guard.value(step.time(at), space_.x);
+        hit.departed = has_left(hit.side, hit.value);
+    }
+}
+
+template <class X, bool single>
+inline void EventSearch<X, single>::place(const CurrentStep& step, double s, X& x)
+{
+    const double ahead = s - first_->where.root;
+    if (goes_straight_ && std::fabs(ahead) <= straight_part * step.h()) {
+        move(x, before_, ahead, rate_);
+    } else {
+        step.restep(s, x);
     }
 }
 
@@ -93,12 +104,13 @@ inline void EventSearch<X, single>::settle_place(const CurrentStep& step, bool t
         if (at_ == 0) {
             assign(before_, step.x0());
         } else {
-            step.restep(at_, before_);
+            place(step, at_, before_);
         }
     }
     if (time_event_due && at_ + resolution_.window(step.time(at_)) >= step.h()) {
         at_ = step.h();
         at_remainder_ = 0;
+        rated_at_set_ = false;
         assign(before_, step.x1());
     }
 }

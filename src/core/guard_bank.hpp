@@ -47,6 +47,7 @@ public:
             fresh.events = record.events;
             record = fresh;
         }
+        for (double& rests : at_rest_) rests = 0;
         for (double& size : sizes_) size = 0;
         waiting_ = false;
         forget_screening();
@@ -241,7 +242,7 @@ public:
 
     void arm(std::size_t i, Side side) noexcept
     {
-        GuardRecord& record = records_[i];
+        GuardRecord& record = (*this)[i];
         if (side == record.last_side && record.side == opposite(side)) record.returned = true;
         record.side = side;
         sign_[i] = records_[i].enabled && !records_[i].deferred ? sign_of(side) : 0;
@@ -262,7 +263,36 @@ public:
         record.departs = false;
         record.from = 0;
         arm(i, record.side);
+        if constexpr (!single) at_rest_[i] = record.band == 0 && !record.deferred ? 1 : 0;
         return true;
+    }
+
+    /// Calls `visit(i)`, in ascending order, for the guards that have to be armed anew with their
+    /// samples at the start: all except those at rest that are still on their sides.
+    template <class Visit>
+    void for_each_to_arm(const Visit& visit)
+    {
+        as_screened_ = false;
+        if constexpr (single) {
+            visit(0);
+        } else {
+            this->for_each_that(
+                [this](std::size_t i) __attribute__((always_inline)) {
+                    const bool stays = at_rest_[i] * sign_[i] * g0_[i] > 0;
+                    return !(stays & Guards::is_finite(g0_[i]));
+                },
+                visit);
+        }
+    }
+
+    /// Forgets which guards have fired, and how far from their surfaces.
+    void forget_fired() noexcept
+    {
+        for_each_not_at_rest([](GuardRecord& record) { record.fired = false; });
+    }
+    void forget_bands() noexcept
+    {
+        for_each_not_at_rest([](GuardRecord& record) { record.band = 0; });
     }
 
     /// Width [s] below which a bracket in a step of length h is dominated by the guard's
@@ -279,7 +309,7 @@ public:
     /// Defers guard i, which is not examined until it is woken.
     void put_to_sleep(std::size_t i) noexcept
     {
-        records_[i].deferred = true;
+        (*this)[i].deferred = true;
         sign_[i] = 0;
     }
 
@@ -367,7 +397,7 @@ public:
     void visit(Visit&& visit)
     {
         for (std::size_t i = 0; i < size(); ++i) {
-            GuardRecord& record = records_[i];
+            GuardRecord& record = (*this)[i];
             visit(sign_[i]);
             if (rules_.keeps_sizes()) visit(sizes_[i]);
             visit(g0_[i]);
@@ -400,6 +430,18 @@ public:
     [[nodiscard]] bool waiting() const noexcept { return waiting_; }
 
 private:
+    template <class Change>
+    void for_each_not_at_rest(const Change& change) noexcept
+    {
+        if constexpr (single) {
+            change(records_[0]);
+        } else {
+            this->for_each_that(
+                [this](std::size_t i) __attribute__((always_inline)) { return at_rest_[i] == 0; },
+                [&](std::size_t i) { change(records_[i]); });
+        }
+    }
+
     /// As std::fmax, but inlined: the larger of the two, or the one that is a number.
     [[nodiscard]] static double larger(double a, double b) noexcept
     {
@@ -420,6 +462,7 @@ private:
 
     using Guards::any_of;
     using Guards::as_screened_;
+    using Guards::at_rest_;
     using Guards::backward_;
     using Guards::bands_;
     using Guards::checked_;

@@ -250,7 +250,7 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
         this->record_jump(i, bank_[i].side);
         return false;
     }
-    for (std::size_t k = 0; k < bank_.size(); ++k) bank_[k].band = 0;
+    bank_.forget_bands();
     bank_[i].band = std::fabs(bank_.g0(i));
     search_.fired().clear();
     search_.fired().push_back(i);

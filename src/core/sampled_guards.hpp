@@ -32,6 +32,7 @@ protected:
         const std::size_t count = system->guard_count(system.door());
         behind_.resize(count);
         records_.resize(count);
+        at_rest_.resize(count);
         for (std::size_t i = 0; i < count; ++i) {
             records_[i].info = system->info(system.door(), i);
         }
@@ -40,7 +41,12 @@ protected:
 
 public:
     [[nodiscard]] std::size_t size() const noexcept { return single ? 1 : records_.size(); }
-    [[nodiscard]] GuardRecord& operator[](std::size_t i) noexcept { return records_[i]; }
+    /// Guard i, which is not at rest from now on.
+    [[nodiscard]] GuardRecord& operator[](std::size_t i) noexcept
+    {
+        if constexpr (!single) at_rest_[i] = 0;
+        return records_[i];
+    }
     [[nodiscard]] const GuardRecord& operator[](std::size_t i) const noexcept
     {
         return records_[i];
@@ -144,6 +150,9 @@ protected:
     bool backward_;
     bool selective_ = false;  ///< whether any guard is disabled or has no rate
     PerGuard<GuardRecord, single> records_{};
+    /// 1 for a guard whose record is that of a guard armed away from its surface, with no part in
+    /// the last set: nothing of it changes while it stays on its side. Else 0.
+    Doubles at_rest_{};
 
 private:
     [[nodiscard]] bool is_rateless(std::size_t i) const noexcept

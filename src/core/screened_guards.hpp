@@ -5,6 +5,7 @@
 // are screened in one loop.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -39,6 +40,8 @@ protected:
         for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_}) numbers->resize(size());
         for (const GuardRecord& record : records_) {
             bands_ = bands_ || record.info.touch > 0;
+            const int degree = record.info.degree;
+            of_time_ = of_time_ && degree >= 1 && degree <= 3 && !record.info.boolean;
             linear_ = linear_ && record.info.degree == 1 && !record.info.boolean;
         }
         linear_ = linear_ && !bands_ && rules.screening == Screening::extremum;
@@ -94,6 +97,24 @@ public:
         checked_ = Checked::further;
     }
 
+    /// The same for the guards in doubt alone, if they are few, on the step's polynomial. The
+    /// others count as being on their cubics there.
+    [[nodiscard]] bool sample_doubtful_further(const Step<X>& step, std::uint64_t& calls)
+    {
+        if (are_few() || !marked_ || marks_.size() > size() / 4 || !system_->guard_on) return false;
+        if (!step.interpolates()) return false;
+        const double s = CubicCheck::further * step.h();
+        for (std::size_t i = 0; i < size(); ++i) {
+            further_[i] = cubic(i, step.h()).at(CubicCheck::further);
+        }
+        const auto x = step.template component_view<false>(s);
+        for (const std::size_t i : marks_) {
+            further_[i] = this->view(i, step.mode(), calls).value(step.time(s), x);
+        }
+        checked_ = Checked::further;
+        return true;
+    }
+
     /// Evaluates them once more, at the part `u` of the step, one of `CubicCheck::places`.
     void sample_place(const Step<X>& step, double u, const X& x, std::uint64_t& calls)
     {
@@ -128,6 +149,9 @@ public:
         });
     }
 
+    /// Whether all guards are the cubics through their ends in a step in which only the time moves.
+    [[nodiscard]] bool are_cubics_of_time() const noexcept { return of_time_; }
+
     /// Whether any guard needs a second evaluation inside the step, or a search.
     [[nodiscard]] bool doubtful(double h) noexcept
     {
@@ -147,10 +171,14 @@ public:
     /// if the first agreed with the cubic to nine digits, which is no coincidence.
     [[nodiscard]] bool needs_second_check(double h) const noexcept
     {
-        for (std::size_t i = 0; i < size(); ++i) {
+        const auto needs = [this, h](std::size_t i) {
             const CubicCheck look = cubic(i, h);
             const double e = look.deviation(CubicCheck::inside, inside_[i]);
-            if (sign_[i] != 0 && !(0x1p30 * e <= look.size())) return true;
+            return sign_[i] != 0 && !(0x1p30 * e <= look.size());
+        };
+        if (marked_) return std::any_of(marks_.begin(), marks_.end(), needs);
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (needs(i)) return true;
         }
         return false;
     }
@@ -184,6 +212,13 @@ public:
         if (!checked()) return true;
         const CubicCheck look = cubic(i, h);
         return 0x1p16 * deviation(look, i) <= look.size();
+    }
+
+    /// Whether guard i differs in the step from the cubic through its ends by so little that their
+    /// roots lie within a millionth of the step, as far as it has been evaluated.
+    [[nodiscard]] bool is_cubic(std::size_t i, double h) const noexcept
+    {
+        return checked() && 0x1p20 * deviation(cubic(i, h), i) <= std::fabs(g1_[i] - g0_[i]);
     }
 
     /// Whether the guards have been evaluated inside the step.
@@ -244,9 +279,11 @@ public:
     }
 
 protected:
+    using Guards::at_rest_;
     using Guards::records_;
     using Guards::rules_;
     using Guards::sample_values;
+    using Guards::system_;
 
     /// Places in the current step at which the guards have been evaluated.
     enum class Checked : std::uint8_t { not_at_all, inside, further, everywhere };
@@ -494,6 +531,7 @@ protected:
     bool starts_phase_ = false;
     bool waiting_ = false;      ///< whether any guard may be on a plateau
     bool bands_ = false;        ///< whether any guard declares a tolerance for touches
+    bool of_time_ = true;       ///< whether all guards are of degree 3 or less
     bool linear_ = true;        ///< whether all guards are of degree 1, and are screened as such
     bool screened_ = false;     ///< whether `suspects_` belongs to the current step
     bool as_screened_ = false;  ///< and no guard has changed since then

@@ -238,7 +238,7 @@ public:
         kernel_->depart(system_.door(), state_, s, x, dxdt);
         add_tangent(s, x);
         if (kernel_->end_rate) {
-            for_components([&](auto i) { dxdt[i] += state_.rate0[i]; });
+            detail::move(dxdt, dxdt, 1, state_.rate0);
         } else {
             flow(s, x, dxdt);
         }
@@ -261,6 +261,22 @@ public:
         for_components([&](auto i) { dxdt[i] = rate[i]; });
     }
 
+    /// Whether the method has an interpolant of its own.
+    [[nodiscard]] bool interpolates() const noexcept
+    {
+        return kernel_->interpolates() && !state_.host;
+    }
+    /// Whether only the time moves in the step: what `peek` sees is the start.
+    [[nodiscard]] bool stands() const noexcept
+    {
+        if (kernel_->interpolates() || state_.host) return false;
+        bool stands = true;
+        for_components([&](auto i) {
+            stands = stands && state_.x1[i] == state_.x0[i] && state_.rate0[i] == 0 &&
+                     state_.rate1[i] == 0;
+        });
+        return stands;
+    }
     [[nodiscard]] bool is_hosts() const noexcept { return state_.host; }
     /// Whether a host's path is the cubic through the states and rates at the ends.
     [[nodiscard]] bool is_hosts_cubic() const noexcept
@@ -570,6 +586,10 @@ private:
     /// From w to x at offset s.
     void add_tangent(double s, X& w) const noexcept
     {
+        if constexpr (LongArray<X>) {
+            return add_tangent_many(w.data(), state_.x0.data(), s, state_.rate0.data(),
+                                    state_.remainder.data(), w.size());
+        }
         for_components([&](auto i) {
             w[i] = state_.x0[i] + (s * state_.rate0[i] + (w[i] + state_.remainder[i]));
         });

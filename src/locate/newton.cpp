@@ -40,8 +40,9 @@ double hermite_root(double v0, double r0, double v1, double r1, double sign) noe
 
 namespace {
 
-/// Largest fraction of a bracket over which the flow may be extrapolated: its square is 9e-16.
-constexpr double straight_part = 3e-8;
+/// Largest fraction of a bracket over which Heun's step along the flow is as good as a repeat of
+/// the step: a twelfth of its cube is 5e-18.
+constexpr double bent_part = 0x1p-18;
 /// Number of consecutive corrections that may fail to halve the one before.
 constexpr int most_linear = 4;
 
@@ -103,6 +104,7 @@ private:
     [[nodiscard]] bool ends_straight(const GuardSample& sample, double correction, Location& where);
     [[nodiscard]] bool close_in(const GuardSample& sample, double s, double& noise);
     void halve_along(const GuardSample& sample);
+    [[nodiscard]] double first_place();
     [[nodiscard]] Location located(const TwoSum& root);
     void mark_jump(Location& where);
     [[nodiscard]] Location hidden(double rate, double noise);
@@ -239,17 +241,44 @@ bool Search::ends_straight(const GuardSample& sample, double correction, Locatio
     return noise > 0;
 }
 
+/// Where to sample first: the root of the cubic through the ends, refined by the secant rule on the
+/// step's polynomial where that is free. Its error there is about a part of its last correction
+/// that is as small as the change of the slope.
+double Search::first_place()
+{
+    const auto& [lo, hi] = bracket_;
+    const double h = scale_.h;
+    const double u = detail::hermite_root(lo.value, lo.rate * h, hi.value, hi.rate * h,
+                                          path_.side() == Side::above ? 1 : -1);
+    double s = lo.s + h * u;
+    if (!path_.foretells()) return s;
+    const double rise = hi.value - lo.value;
+    double slope = ((1 - u) * (1 - 3 * u) * lo.rate + u * (3 * u - 2) * hi.rate) +
+                   6 * u * (1 - u) * (rise / h);
+    GuardSample at = path_.dense_value(s);
+    for (int k = 0; k < 3; ++k) {
+        const double correction = -at.value / slope;
+        if (!(std::fabs(correction) <= 0.1 * h && bracket_.contains(s + correction))) break;
+        s += correction;
+        if (std::fabs(correction) <= 1e-4 * h) break;
+        const GuardSample next = path_.dense_value(s);
+        slope = (next.value - at.value) / correction;
+        at = next;
+    }
+    return s;
+}
+
 Location Search::run()
 {
     auto& [lo, hi] = bracket_;
-    double s = lo.s + scale_.h * detail::hermite_root(lo.value, lo.rate * scale_.h, hi.value,
-                                                      hi.rate * scale_.h,
-                                                      path_.side() == Side::above ? 1 : -1);
+    double s = first_place();
     double past = 0;
     double last_distance = std::numeric_limits<double>::infinity();
     double last_value = std::numeric_limits<double>::infinity();
     int linear = 0;
     Location where;
+    GuardSample from;  // the last sample, where the state at it is still at hand
+    bool beside = false;
     for (;;) {
         const double width = bracket_.width();
         const double finest = path_.finest(hi.s);
@@ -257,7 +286,9 @@ Location Search::run()
         s = inside(s, finest);
         if (std::isnan(s)) break;
 
-        const GuardSample sample = path_.value_and_rate(s);
+        beside = beside && std::fabs(s - from.s) <= bent_part * scale_.h;
+        const GuardSample sample =
+            beside ? path_.value_and_rate_beside(from, s) : path_.value_and_rate(s);
         const bool beyond = path_.has_left(sample);
         curvature_ = std::max({curvature_, bend(lo, sample), bend(sample, hi)});
         const GuardSample replaced = beyond ? hi : lo;
@@ -278,6 +309,7 @@ Location Search::run()
         last_distance = distance;
         if (linear == most_linear || !std::isfinite(correction)) {
             linear = 0;
+            beside = false;
             size_ = std::max(size_, detail::narrow_by_values(path_, bracket_, replaced, tolerance_,
                                                              1e-3 * width));
             path_.complete(lo);
@@ -289,6 +321,8 @@ Location Search::run()
         // Converged from one side: sample the other side.
         past = distance > finest ? 0 : past > 0 ? 4 * past : finest;
         s += correction + (beyond ? -past : past);
+        from = sample;
+        beside = true;
         // Three samples have not halved the bracket: bisect.
         slow_ = bracket_.width() > width / 2 ? slow_ + 1 : 0;
         if (slow_ == 3) {

@@ -1022,5 +1022,61 @@ TEST(HardEvents, ASampleAtTheTimeOfAnEventShowsTheStateAfterIt)
     EXPECT_GT(samples, 300U);
 }
 
+/// x'' = -sign x: a flow that jumps at the surface of its own guard.
+struct Valley {
+    using State = X3;
+    void flow(double, const X3& x, X3& dxdt) const { dxdt = {x[1], x[0] < 0 ? 1.0 : -1.0, 0}; }
+    template <class V>
+    [[nodiscard]] double guard(double, const V& x) const
+    {
+        return x[0];
+    }
+    void reset(double, X3& x) const { x[2] += 1; }
+    static constexpr GuardInfo guard_info(std::size_t) { return {.crossing = Crossing::either}; }
+};
+
+TEST(HardEvents, AFlowThatJumpsAtItsSurfaceIsFollowedUpToTheSurface)
+{
+    // Until there the motion is a parabola, which any of these methods follows exactly.
+    const auto check = [](const auto& stepping, double start, double step) {
+        const auto run = integrate(Valley{}, X3{start, 0, 0},
+                                   {.t_end = 1.5 * std::sqrt(2 * start), .step = step}, stepping);
+        ASSERT_EQ(run.events.size(), 1U) << start;
+        const double fall = std::sqrt(2 * start);
+        EXPECT_NEAR(run.events[0].t, fall, 2e-15 * fall) << start << ' ' << step;
+        EXPECT_NEAR(run.events[0].before[1], -fall, 2e-15 * fall) << start << ' ' << step;
+    };
+    for (int k = 0; k < 100; ++k) {
+        const double start = 0.5 + 0.01 * k;
+        for (const double step : {0.3, 0.02, 0.001}) {
+            check(FixedStep<Rk4>{}, start, step);
+            check(FixedStep<Dopri5>{}, start, step);
+            check(FixedStep<Fehlberg78>{}, start, step);
+        }
+    }
+}
+
+/// A state that does not move, and a cubic of the time, with roots at 1, 1.25 and 60.
+struct Timetable {
+    using State = X1;
+    static void flow(double, const X1&, X1& dxdt) { dxdt = {0}; }
+    [[nodiscard]] static double guard(double t, const X1& x)
+    {
+        return x[0] * ((t - 1) * (t - 1.25) * (t - 60));
+    }
+    static constexpr GuardInfo guard_info(std::size_t)
+    {
+        return {.crossing = Crossing::either, .degree = 3};
+    }
+};
+
+TEST(HardEvents, WhereOnlyTheTimeMovesEveryRootOfACubicIsFound)
+{
+    const auto run = integrate(Timetable{}, X1{1}, {.t_end = 100}, ErrorControlled<Fehlberg78>{});
+    ASSERT_EQ(run.events.size(), 3U);
+    const std::array<double, 3> roots{1, 1.25, 60};
+    for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(run.events[i].t, roots[i], 1e-12);
+}
+
 }  // namespace
 }  // namespace ricochet::events_hard_test

@@ -91,6 +91,10 @@ template <class X>
 void move_many(double* to, const double* from, double factor, const double* direction,
                std::size_t count) noexcept;
 
+/// w = x0 + (s rate0 + (w + remainder)), component by component, likewise.
+void add_tangent_many(double* w, const double* x0, double s, const double* rate0,
+                      const double* remainder, std::size_t count) noexcept;
+
 /// A state of doubles side by side, whose number is not small. (Eigen's may be rows of a matrix.)
 template <class X>
 concept LongArray = !is_small<X> && !requires
@@ -133,6 +137,11 @@ template <class X>
 [[nodiscard]] bool same_state(const X& a, const X& b)
 {
     if (a.size() != b.size()) return false;
+    if constexpr (LongArray<X>) {
+        double differs = 0;  // a double, so that the loop is vectorised
+        for (decltype(a.size()) i = 0; i < a.size(); ++i) differs = a[i] == b[i] ? differs : 1.0;
+        return differs == 0;
+    }
     bool equal = true;
     for_each_component(
         a, [&](auto c) __attribute__((always_inline)) { equal = equal && a[c] == b[c]; });

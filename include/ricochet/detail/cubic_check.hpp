@@ -46,11 +46,17 @@ struct CubicCheck {
     {
     }
 
+    /// The cubic at `u`.
+    [[nodiscard]] double at(double u) const noexcept
+    {
+        const double w = 1 - u;
+        return w * w * (w * v0 + 3 * u * b1) + u * u * (3 * w * b2 + u * v1);
+    }
+
     /// How far a value at `u` is from the cubic.
     [[nodiscard]] double deviation(double u, double value) const noexcept
     {
-        const double w = 1 - u;
-        return std::fabs(value - (w * w * (w * v0 + 3 * u * b1) + u * u * (3 * w * b2 + u * v1)));
+        return std::fabs(value - at(u));
     }
 
     /// The lowest control point of the cubic times `sign`, excluding the start, which may be

@@ -87,11 +87,14 @@ struct Location {
     return std::numeric_limits<double>::epsilon() * std::max(std::fabs(s), 0x1p-20 * std::fabs(h));
 }
 
+/// Largest fraction of a step over which the flow may be extrapolated: its square is 9e-16.
+inline constexpr double straight_part = 3e-8;
+
 /// Work space for the states of a probe, so that probing allocates nothing.
 template <class X>
 struct ProbeSpace {
-    explicit ProbeSpace(const X& like) : x(like), dxdt(like), root(like) {}
-    X x, dxdt, root;
+    explicit ProbeSpace(const X& like) : x(like), dxdt(like), root(like), next(like) {}
+    X x, dxdt, root, next;
 };
 
 /// Source of the states inside a step.
@@ -106,6 +109,7 @@ struct PathProperties {
     Crossing crossing = Crossing::falling;
     bool is_rated = true;        ///< the system gives the guard's rate; else it is a difference
     bool is_polynomial = false;  ///< the step has a polynomial, which continues beyond its end
+    bool is_free = false;        ///< and the polynomial costs no evaluation of the flow
 };
 
 /// A guard on a step as a function of the offset s in [0, h]: the only access to a motion that a
@@ -119,6 +123,15 @@ public:
     [[nodiscard]] Crossing crossing() const noexcept { return properties_.crossing; }
     [[nodiscard]] bool is_rated() const noexcept { return properties_.is_rated; }
     [[nodiscard]] bool is_polynomial() const noexcept { return properties_.is_polynomial; }
+    /// Whether a root is found more cheaply on the step's polynomial first: the polynomial is free,
+    /// and the guard on it is not known to be the cubic through its ends.
+    [[nodiscard]] bool foretells() const noexcept
+    {
+        return properties_.is_free && !is_cubic_ && path_ == Path::restep;
+    }
+    /// Declares that the guard hardly differs from the cubic through its values and rates at the
+    /// ends of the step.
+    void take_as_cubic() noexcept { is_cubic_ = true; }
 
     /// Whether samples are taken from the step's polynomial.
     [[nodiscard]] bool on_polynomial() const noexcept { return path_ == Path::dense; }
@@ -163,6 +176,13 @@ public:
     {
         return {.s = s, .value = value_along_the_flow(from.s, s), .rate = from.rate};
     }
+    /// The guard and its rate at offset s, so near `from`, which must be the last sample that
+    /// `value_and_rate` or this function took, that Heun's step along the flow is as good as a
+    /// repeat of the step.
+    [[nodiscard]] GuardSample value_and_rate_beside(const GuardSample& from, double s)
+    {
+        return sample(s, point_beside(from.s, s));
+    }
     /// Tells the path that the root lies `correction` [s] after the last sample that
     /// `value_and_rate` took, and that the motion is straight until there.
     virtual void settle(double correction) = 0;
@@ -195,11 +215,13 @@ protected:
     [[nodiscard]] virtual double dense_value_at(double s) = 0;
     [[nodiscard]] virtual Point dense_point_at(double s) = 0;
     [[nodiscard]] virtual double value_along_the_flow(double from, double s) = 0;
+    [[nodiscard]] virtual Point point_beside(double from, double s) = 0;
 
     PathProperties properties_;
     Path path_;
     Side side_ = Side::plateau;
     bool settled_ = false;
+    bool is_cubic_ = false;
 
 private:
     [[nodiscard]] static GuardSample sample(double s, const Point& at) noexcept
@@ -220,7 +242,8 @@ public:
         : GuardPath({.h = step.h(),
                      .crossing = guard.crossing(),
                      .is_rated = is_rated(guard),
-                     .is_polynomial = has_polynomial(step)},
+                     .is_polynomial = has_polynomial(step),
+                     .is_free = interpolates(step)},
                     path),
           guard_(&guard),
           step_(&step),
@@ -252,6 +275,10 @@ public:
         if (!(placed_ == where.root)) place(where.root);
         return space_->x;
     }
+
+    /// Whether the root that a locator found last lies on the line along the flow in the work
+    /// space.
+    [[nodiscard]] bool is_settled() const noexcept { return settled_; }
 
     void complete(GuardSample& sample) override
     {
@@ -367,6 +394,50 @@ private:
             step_->restep(s, space_->x, space_->dxdt);
             placed_ = s;
         }
+        return point_of_space(s);
+    }
+
+    [[nodiscard]] Point point_beside(double from, double s) override
+    {
+        if (path_ == Path::dense || !follows_flow()) return point_at(s);
+        detail::move(space_->root, space_->x, s - from, space_->dxdt);
+        step_->flow(s, space_->root, space_->next);
+        if (!flows_smoothly(s - from)) return point_at(s);
+        detail::move(space_->x, space_->x, (s - from) / 2, space_->dxdt);
+        detail::move(space_->x, space_->x, (s - from) / 2, space_->next);
+        detail::assign(space_->dxdt, space_->next);
+        placed_ = s;
+        return point_of_space(s);
+    }
+
+    /// Whether the flow of the work space changes to the next, `ds` away, by no more than the flow
+    /// changes in the step suggests: the mean of a flow that jumps there would lead astray.
+    [[nodiscard]] bool flows_smoothly(double ds) const
+    {
+        const double part = 64 * std::fabs(ds) / step_->h();
+        const State& rate0 = step_->rate0();
+        const State& rate1 = step_->rate1();
+        bool smooth = true;
+        detail::for_each_component(space_->x, [&](auto i) {
+            const double rate = space_->dxdt[i];
+            const double change = std::fabs(space_->next[i] - rate);
+            smooth &= change <= part * std::fabs(rate1[i] - rate0[i]) + 0x1p-40 * std::fabs(rate);
+        });
+        return smooth;
+    }
+
+    /// Whether the step's own map follows the flow closely enough for short steps along the flow.
+    [[nodiscard]] bool follows_flow() const noexcept
+    {
+        if constexpr (requires { step_->is_hosts(); }) {
+            if (step_->is_hosts()) return false;
+        }
+        return step_->order() >= 4;
+    }
+
+    /// The guard and its rate at the state and the flow in the work space.
+    [[nodiscard]] Point point_of_space(double s)
+    {
         const double t = step_->time(s);
         if constexpr (requires { guard_->point(t, space_->x, space_->dxdt, 1.0); }) {
             const auto at = guard_->point(t, space_->x, space_->dxdt, step_->h());
@@ -457,6 +528,12 @@ private:
     {
         if constexpr (requires { step.is_hosts(); }) return !step.is_hosts();
         return DenseStep<Step, State>;
+    }
+
+    [[nodiscard]] static bool interpolates(const Step& step) noexcept
+    {
+        if constexpr (requires { step.interpolates(); }) return step.interpolates();
+        return false;
     }
 
     [[nodiscard]] View view(double s) const { return component_view<false>(*step_, s); }
