@@ -371,27 +371,11 @@ bool certify_scenes(const std::string& only, const std::string& models, std::siz
     for (const Scene& scene : scenes()) {
         if (!only.empty() && only != scene.name) continue;
         const Proof proof = measure(scene, models, iterations, options);
-        good = good && proof.holds && proof.share >= 0.8;
+        const double allowed = scene.dimension == 2 ? 1 : scene.dimension == 3 ? 10 : 300;
+        good = good && proof.holds && proof.share >= 0.8 && proof.seconds <= allowed &&
+               proof.boxes >= 0.5 && proof.boxes <= 2;
     }
     return good;
-}
-
-Measured prove_scenes()
-{
-    Measured out{.pass = true, .text = ""};
-    for (const Scene& scene : scenes()) {
-        const double allowed = scene.dimension == 2 ? 1 : scene.dimension == 3 ? 10 : 300;
-        const Proof proof = measure(scene, "", 0, {.threads = 2});
-        const bool good = proof.holds && proof.seconds <= allowed && proof.share >= 0.8 &&
-                          proof.boxes >= 0.5 && proof.boxes <= 2;
-        out.pass = out.pass && good;
-        out.details.push_back(
-            fmt::format("{}, {}-D: {:.2f} s of {}, clears {:.1f} %, boxes {:.2f} of the estimate{}",
-                        scene.name, scene.dimension, proof.seconds, allowed, 100 * proof.share,
-                        proof.boxes, proof.holds ? "" : ", NOT PROVED OR CONTRADICTED"));
-    }
-    out.text = fmt::format("{} scenes, each with 1e6 searched states", out.details.size());
-    return out;
 }
 
 }  // namespace ricochet::bench

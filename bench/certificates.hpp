@@ -5,7 +5,6 @@
 #include <string>
 #include <string_view>
 
-#include "measure.hpp"
 #include "ricochet/learn/certify.hpp"
 
 namespace ricochet::bench {
@@ -18,13 +17,11 @@ namespace ricochet::bench {
                                       learn::CertifyOptions options);
 
 /// Trains a network for each scene, or for the one called `only`, unless the directory `models` has
-/// it; proves it and prints the results. Returns whether everything was proved and clears 80 % of
-/// the states beyond a tenth of the scene's scale. `iterations` of the training; 0: the default of
-/// the scene.
+/// it; proves it and prints the results. Returns whether everything was proved within the seconds
+/// allowed (1 in two dimensions, 10 in three, 300 in four) and within a factor of two of the
+/// estimated boxes, and clears 80 % of the states beyond a tenth of the scene's scale. `iterations`
+/// of the training; 0: the default of the scene.
 [[nodiscard]] bool certify_scenes(const std::string& only, const std::string& models,
                                   std::size_t iterations, const learn::CertifyOptions& options);
-
-/// The same against the seconds allowed: 1 in two dimensions, 10 in three, 300 in four.
-[[nodiscard]] Measured prove_scenes();
 
 }  // namespace ricochet::bench

@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+#include "paths.hpp"
 #include "report/ball_scene.hpp"
 #include "report/gas.hpp"
 #include "report/problems.hpp"
@@ -40,13 +41,7 @@ namespace ricochet::bench {
 
 namespace {
 
-using Path = std::function<void()>;
 using report::Task;
-
-struct Named {
-    std::string_view name;
-    std::function<Path()> prepare;
-};
 
 /// A run whose result is kept.
 template <class S, class Stepping = ErrorControlled<Dopri5>, class Detector = Extremum>
@@ -145,10 +140,10 @@ Path circuit()
     };
 }
 
-const std::vector<Named>& paths()
+std::vector<Named> paths()
 {
     using report::ball;
-    static const std::vector<Named> all{
+    std::vector<Named> all{
         {"ball, dopri5", [] { return run(ball(), tight); }},
         {"ball, fehlberg78", [] { return run(ball(), tight, ErrorControlled<Fehlberg78>{}); }},
         {"ball, Taylor", [] { return run(ball(), tight, ErrorControlled<Taylor>{}); }},
@@ -181,6 +176,9 @@ const std::vector<Named>& paths()
         {"100 discs as a scene",
          [] { return simulated(report::gas_scene(100), report::gas_end(100)); }},
     };
+    for (const auto& more : {paths_of_runs(), paths_of_guards(), paths_of_bodies()}) {
+        all.insert(all.end(), more.begin(), more.end());
+    }
     return all;
 }
 

@@ -129,6 +129,10 @@ void for_each_problem(Visit visit)
         visit("thermostats-" + std::to_string(n), "Bank of " + std::to_string(n) + " thermostats",
               [n] { return std::vector{thermostats(n)}; });
     }
+    for (const std::size_t n : {20U, 200U, 2000U}) {
+        visit("plain-" + std::to_string(n), std::to_string(n) + " components without guards",
+              [n] { return std::vector{rotations(n)}; });
+    }
     visit("guards-0", "Pendulum without guards", [] { return std::vector{pendulum(Unwatched{})}; });
     for (const std::size_t n : {1U, 10U, 100U}) {
         visit("guards-" + std::to_string(n), "Pendulum with " + std::to_string(n) + " idle guards",

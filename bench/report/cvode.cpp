@@ -6,6 +6,9 @@
 
 #include <memory>
 
+#include "hosts/sundials_setup.hpp"
+#include "ricochet/monitor.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"
 #include "sundials.hpp"
 
 namespace ricochet::report {
@@ -62,12 +65,29 @@ private:
     SUNNonlinearSolver iteration_ = nullptr;
 };
 
+/// The ball in the same integrator, whose steps the monitor examines instead.
+Answer ball_by_monitor(double tolerance)
+{
+    const BouncingBall system({.gravity = 9.81, .restitution = 0.9});
+    const Mode mode = 0;
+    const BouncingBall::State x0{10, 0};
+    hosts_test::CvodeOf<BouncingBall, CV_ADAMS> made(system, mode, x0, {tolerance, tolerance});
+    EventMonitor monitor(system, x0, {.event_states = false});
+    Answer answer{.finished = hosts::run(made.host(), monitor, 20.5) == Verdict::stands};
+    for (const auto& event : monitor.events()) answer.add(event.t, event.guard);
+    return answer;
+}
+
 }  // namespace
 
 void add_cvode(Cells& cells)
 {
     cells.add_version("CVODE", sundials_version());
     add_solver_cells<Solver>(cells, "CVODE", "Adams, root finding");
+    for (const double tolerance : tolerances_of("ball")) {
+        cells.add({"ball", "ricochet", "monitor in CVODE, Adams", tolerance,
+                   [=] { return [=] { return ball_by_monitor(tolerance); }; }});
+    }
 }
 
 }  // namespace ricochet::report

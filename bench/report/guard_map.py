@@ -18,7 +18,7 @@ def cost(way, price):
 
 
 def group(name):
-    return "every k" if name.startswith("every ") and name != "every step" else name
+    return "every k" if name.removeprefix("every ").isdigit() else name
 
 
 def winner(row, price):

@@ -7,7 +7,9 @@
 // guard alone; value and rate; these and bounds; the sign alone. The length of the steps determines
 // how many events there are per step. Ways:
 //
-//     every step   the exact detector at every step, with which the others are compared
+//     every step   the exact detector at every step, with which the others are compared; without
+//     the
+//                  tree of segments, too
 //     every k      at every k-th step, with rollback; may miss events
 //     planned      bounds and a table of lower bounds
 //     verified     the planner with a horizon gate as its forecast; keeps events
@@ -151,6 +153,7 @@ template <class System>
 {
     const auto start = std::chrono::steady_clock::now();
     const Cavern cavern;
+    const Cavern brute({.search = Cavern::Search::brute});
     const Hidden<Cavern> hidden(cavern);
     const WithRate with_rate(cavern);
     const BlackBox<Cavern> black_box(cavern, 0);
@@ -172,6 +175,7 @@ template <class System>
         rate["rows"].push_back(race(without_bounds(with_rate, step, gate)));
         sign["rows"].push_back(race(without_bounds(black_box, step, gate)));
         std::vector<Contender> all = without_bounds(cavern, step, named);
+        all.push_back(contender("every segment at every step", brute, step, Extremum{}));
         all.push_back(contender("planned", cavern, step, planner()));
         all.push_back(
             contender("verified", cavern, step, Foreseen<>(gates::Gate(named), planning)));

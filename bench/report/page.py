@@ -125,7 +125,7 @@ def figures(report):
         row["share"] = 1 - row.get("missed", events) / events if events else 1
     out = []
     for name, problem in problems.items():
-        if re.match(r"near-tangent|balls-|guards-", name) or not by[name]:
+        if re.match(r"near-tangent|balls-|guards-|plain-", name) or not by[name]:
             continue
         unit = "relative error of the state" if not problem["events"] else "largest error [s]"
         out.append((name, problem["title"] + ": time against error",
@@ -185,7 +185,7 @@ def at_equal_error(report):
     """Per problem and bound: our fastest cell, and how many times as long each peer takes."""
     out = []
     for name, problem in report["problems"].items():
-        if name.startswith(("near-tangent", "guards-")):
+        if name.startswith(("near-tangent", "guards-", "plain-")):
             continue
         rows = [row for row in report["rows"] if row["problem"] == name]
         for bound in BOUNDS:

@@ -467,6 +467,28 @@ struct Unwatched {
     }
 };
 
+/// n / 2 harmonic oscillators in one state, without guards: the cost of the steps alone.
+struct Rotations {
+    using State = std::vector<double>;
+
+    template <class X>
+    void flow(double /*t*/, const X& x, X& dxdt) const
+    {
+        for (std::size_t i = 0; i < n; i += 2) {
+            dxdt[i] = x[i + 1];
+            dxdt[i + 1] = -x[i];
+        }
+    }
+    std::size_t n = 2;
+};
+
+[[nodiscard]] inline Task<Rotations> rotations(std::size_t n)
+{
+    Task<Rotations> task{.system = {.n = n}, .x0 = std::vector<double>(n), .t_end = 20};
+    for (std::size_t i = 0; i < n; ++i) task.x0[i] = 1.0 / static_cast<double>(1 + i % 7);
+    return task;
+}
+
 template <class System>
 [[nodiscard]] Task<System> pendulum(const System& system)
 {

@@ -222,11 +222,24 @@ class Watched(Problem):
         return x[0] + (10 + which)
 
 
+class Rotations(Problem):
+    guards, t_end = 0, 20
+
+    def __init__(self, n):
+        self.x0 = [1 / (1 + i % 7) for i in range(n)]
+
+    def flow(self, t, x):
+        rate = np.empty_like(x)
+        rate[0::2], rate[1::2] = x[1::2], -x[0::2]
+        return rate
+
+
 PROBLEMS = {"ball": Ball, "impacts": Impacts, "henon-heiles": HenonHeiles,
             "arenstorf": Arenstorf, "stick-slip": Belt, "block": Block, "rolling": Rolling}
 PROBLEMS |= {f"near-tangent-1e-{d}": lambda d=d: NearTangent(10.0 ** -d) for d in range(2, 13, 2)}
 PROBLEMS |= {f"balls-{n}": lambda n=n: Balls(n) for n in (1, 10, 100)}
 PROBLEMS |= {f"thermostats-{n}": lambda n=n: Thermostats(n) for n in (10, 100)}
+PROBLEMS |= {f"plain-{n}": lambda n=n: Rotations(n) for n in (20, 200, 2000)}
 PROBLEMS |= {f"guards-{n}": lambda n=n: Watched(n) for n in (0, 1, 10, 100)}
 
 

@@ -1,4 +1,5 @@
-// The monitor of the C interface finds the same events as the C++ one in the same host, to the bit.
+// The monitor of the C interface finds the same events as the C++ one in the same host, to the bit,
+// and runs by callbacks are those of the C++ template.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +11,9 @@
 #include <string>
 #include <vector>
 
+#include "ball.h"
 #include "check.h"
+#include "ricochet/integrate/integrate.hpp"
 #include "ricochet/monitor.hpp"
 #include "rk4_host.hpp"
 
@@ -489,6 +492,64 @@ std::size_t compare(const char* name, System system, const typename System::X& x
     return cuts;
 }
 
+// --- whole runs ---
+
+/// As in ball.h.
+struct PlainBall {
+    using State = std::array<double, 2>;
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -9.81}; }
+    [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
+    void reset(double, State& x) const { x = {0, -0.9 * x[1]}; }
+};
+
+struct Rotations {
+    using State = std::vector<double>;
+    static int in_c(void*, rc_mode, double, const double* x, double* dxdt, std::size_t n)
+    {
+        for (std::size_t i = 0; i < n; i += 2) {
+            dxdt[i] = x[i + 1];
+            dxdt[i + 1] = -x[i];
+        }
+        return 0;
+    }
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        (void)in_c(nullptr, 0, t, x.data(), dxdt.data(), x.size());
+    }
+};
+
+template <class System, class X>
+void compare_runs(const System& system, const X& x0, double t_end, const rc_callbacks& callbacks)
+{
+    const auto run = integrate(system, x0, {.t_end = t_end});
+    const rc_options options = options_until(t_end);
+    rc_system* in_c = nullptr;
+    rc_simulation* simulation = nullptr;
+    CHECK_STATUS(RC_OK, rc_system_new(&callbacks, &in_c));
+    CHECK_STATUS(RC_OK, rc_simulation_new(in_c, x0.data(), x0.size(), &options, &simulation));
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    CHECK(rc_event_count(simulation) == run.events.size());
+    for (std::size_t i = 0; i < run.events.size(); ++i) {
+        CHECK(event_at(simulation, i).t == run.events[i].t);
+    }
+    CHECK(std::memcmp(rc_state(simulation), run.x.data(), run.x.size() * sizeof(double)) == 0);
+    CHECK(statistics_of(simulation).steps == run.statistics.steps);
+    CHECK_STATUS(RC_OK, rc_simulation_free(simulation));
+    rc_system_free(in_c);
+}
+
+void compare_runs()
+{
+    compare_runs(PlainBall{}, PlainBall::State{10, 0}, 20.5, ball_callbacks());
+    rc_callbacks rotations{};
+    rotations.size = sizeof rotations;
+    rotations.dimension = 200;
+    rotations.flow = Rotations::in_c;
+    Rotations::State x0(200);
+    for (std::size_t i = 0; i < x0.size(); ++i) x0[i] = 1.0 / static_cast<double>(1 + i % 7);
+    compare_runs(Rotations{}, x0, 20, rotations);
+}
+
 }  // namespace
 }  // namespace ricochet::monitor_bits_test
 
@@ -496,6 +557,7 @@ int main()
 {
     using namespace ricochet::monitor_bits_test;
     using namespace ricochet;
+    compare_runs();
     for (const double h : {0.5, 0.1}) {
         CHECK(compare("a ball", Balls<1>{}, {10, 0}, 20.5, h, Verdict::stands) == 13);
         CHECK(compare("two equal balls", Balls<2>{}, {10, 0, 10, 0}, 20.5, h, Verdict::stands) ==

@@ -193,16 +193,20 @@ TEST(ResolvedGuards, FourCrossingsInOneStepAreFourEvents)
     EXPECT_EQ(run.statistics.unresolved_steps, 0u);
 }
 
-TEST(ResolvedGuards, ADecayingGuardKeepsAllItsCrossingsDownTo1em260)
+TEST(ResolvedGuards, ADecayingGuardKeepsAllItsCrossingsDownTo1em287)
 {
     for (const Spiral::Kind kind : {Spiral::product, Spiral::component, Spiral::cube}) {
-        const Spiral spiral{.kind = kind, .decay = 2};
-        // exp(-2 t) to the power of the guard
-        const double end = kind == Spiral::product ? 150 : kind == Spiral::component ? 300 : 100;
-        const auto run = integrate(spiral, Spiral::start, {.t_end = end, .rtol = 1e-8, .atol = 0});
-        EXPECT_EQ(run.outcome, Outcome::reached_end);
-        EXPECT_EQ(run.x[2], spiral.crossings(end)) << kind;
-        EXPECT_EQ(static_cast<double>(run.events.size()), run.x[2]) << kind;
+        for (const double decay : {0.1, 0.5, 2.0}) {
+            const Spiral spiral{.kind = kind, .decay = decay};
+            // exp(-decay t) to the power of the guard is exp(-660) = 1e-287
+            const int power = kind == Spiral::product ? 2 : kind == Spiral::component ? 1 : 3;
+            const double end = 660 / (decay * power);
+            const auto run =
+                integrate(spiral, Spiral::start, {.t_end = end, .rtol = 1e-8, .atol = 0});
+            EXPECT_EQ(run.outcome, Outcome::reached_end);
+            EXPECT_EQ(run.x[2], spiral.crossings(end)) << kind << ' ' << decay;
+            EXPECT_EQ(static_cast<double>(run.events.size()), run.x[2]) << kind << ' ' << decay;
+        }
     }
 }
 

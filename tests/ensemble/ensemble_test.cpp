@@ -6,11 +6,15 @@
 #include <array>
 #include <atomic>
 #include <bit>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <ctime>
+#include <mutex>
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "ricochet/detail/splitmix.hpp"
@@ -68,6 +72,49 @@ TEST(Ensemble, HasTheBitsOfSingleRunsForAnyNumberOfThreads)
         EXPECT_TRUE(all.failures.empty());
         EXPECT_EQ(bits(all), expected) << threads << " threads";
     }
+}
+
+TEST(Ensemble, RowsRunAtTheSameTime)
+{
+    // Each of two threads waits in its first row until the other has begun one, too.
+    std::atomic<unsigned> begun = 0;
+    std::mutex guard;
+    std::set<std::thread::id> seen;
+    const auto all = ensemble(1000,
+                              [&](const EnsembleRow&) {
+                                  bool first = false;
+                                  {
+                                      const std::lock_guard lock(guard);
+                                      first = seen.insert(std::this_thread::get_id()).second;
+                                  }
+                                  if (!first) return true;
+                                  ++begun;
+                                  const auto until =
+                                      std::chrono::steady_clock::now() + std::chrono::seconds(20);
+                                  while (begun < 2 && std::chrono::steady_clock::now() < until)
+                                      std::this_thread::yield();
+                                  return begun >= 2;
+                              },
+                              {.threads = 2});
+    for (const auto& row : all.rows) EXPECT_TRUE(row.value());
+    EXPECT_EQ(seen.size(), 2u);
+}
+
+TEST(Ensemble, TwoThreadsTakeLittleMoreProcessorTimeThanOne)
+{
+    // What threads would take from each other by sharing memory that both write; the least of
+    // several, and half as much again for what else the machine does.
+    const std::vector<Drop> table = drops(4000);
+    double least[2] = {1e9, 1e9};
+    for (int turn = 0; turn < 5; ++turn) {
+        for (const unsigned threads : {1U, 2U}) {
+            const std::clock_t start = std::clock();
+            (void)ensemble(table, fall, {.threads = threads});
+            const double taken = static_cast<double>(std::clock() - start);
+            least[threads - 1] = std::min(least[threads - 1], taken);
+        }
+    }
+    EXPECT_LE(least[1], 1.5 * least[0]);
 }
 
 TEST(Ensemble, SeedsFollowFromTheSeedAndTheIndex)

@@ -406,6 +406,13 @@ TEST(FaultRateState, OrderFourGoesOnAfterAnEarthquake)
         EXPECT_NEAR(r.rupture.mean_slip, second.rupture.mean_slip, 2e-3 * r.rupture.mean_slip);
         EXPECT_EQ(second.handed_over, 0U);
     }
+    for (const double overload : {1e-5, 1e-3, 1e-2, 0.05, 0.1}) {
+        friction.overload = overload;
+        const RateStateRupture r = simulate(
+            fault, {.t_end = 1e9, .rtol = 1e-3, .max_steps = 20'000}, friction, {.order = 4});
+        EXPECT_EQ(r.rupture.outcome, Outcome::reached_end) << overload;
+        EXPECT_EQ(r.unsolved, 0U) << overload;
+    }
 }
 
 TEST(FaultRateState, OnsetIsThatOfFinerSteps)

@@ -51,8 +51,10 @@ TEST(Allocation, NoneWithFixedSteps)
 TEST(Allocation, NoneUnderErrorControl)
 {
     const Options options{.t_end = 20.5, .record_events = false};
+    expect_none<ErrorControlled<Dopri5>>(options, Ends{}, Newton{});
     expect_none<ErrorControlled<Dopri5>>(options, Extremum{}, Newton{});
     expect_none<ErrorControlled<CashKarp54>>(options, Ends{}, Newton{});
+    expect_none<ErrorControlled<Fehlberg78>>(options, Ends{}, Newton{});
     expect_none<ErrorControlled<Fehlberg78>>(options, Extremum{}, Toms748{});
 }
 

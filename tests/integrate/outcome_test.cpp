@@ -31,6 +31,7 @@ TEST(WrongDimension, ALostComponentEndsTheRunBeforeItIsRead)
         const auto fixed =
             integrate(Losing{where}, V{1, 0}, {.t_end = 5, .step = 0.01}, FixedStep<Rk4>{});
         EXPECT_EQ(fixed.outcome, Outcome::wrong_dimension) << where;
+        EXPECT_EQ(fixed.x.size(), 2u) << where;
     }
     EXPECT_EQ(integrate(Losing{}, V{1, 0}, {.t_end = 5}).outcome, Outcome::reached_end);
 }
@@ -86,6 +87,11 @@ TEST(Stalled, ARunWhoseTimeStandsStillEnds)
     EXPECT_EQ(run.outcome, Outcome::stalled);
     EXPECT_LT(run.statistics.steps, 2001u);
     EXPECT_NE(std::string(describe(run.outcome)).find("stall_steps"), std::string::npos);
+
+    // A million steps by default.
+    const auto usual = integrate(Sawtooth{}, {0}, {.t_end = 1, .record_events = false});
+    EXPECT_EQ(usual.outcome, Outcome::stalled);
+    EXPECT_LE(usual.statistics.steps, 2'000'000u);
 
     // For a span of 1e-6 s a thousand steps are 1e-7; a longer wait must be requested.
     Options shorter = options;

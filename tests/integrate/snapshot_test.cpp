@@ -76,6 +76,14 @@ TEST(Snapshot, BelongsToOneKindOfRun)
               ours + "event_tolerance = 0, and this one has event_tolerance = 1e-06");
     EXPECT_EQ(refused_by(saved, Ball{}, {.t_end = 4, .check_inside = false}),
               ours + "check_inside = true, and this one has check_inside = false");
+    EXPECT_NE(refused_by(saved, Ball{}, {.t_end = 4, .step = 0.01}, FixedStep<Dopri5>{}),
+              "accepted");
+    for (const Options& other : {Options{.t_end = 4, .atol = 1e-6},
+                                 {.t_end = 4, .h_max = 1},
+                                 {.t_end = 4, .event_window = 1e-6},
+                                 {.t_end = 4, .stop_at_event = true}}) {
+        EXPECT_EQ(refused_by(saved, Ball{}, other).find(ours), 0u);
+    }
     EXPECT_NE(refused_by(saved, Ball{}, {.t_end = 1e-3}).find("the time"), std::string::npos);
 
     // Files of version 0.1 have another name for `check_inside`.
@@ -163,6 +171,25 @@ TEST(Snapshot, NumbersThatAreNoStateAreRefusedAndChangeNothing)
     }
     EXPECT_LE(taken, 2);
     EXPECT_EQ(simulation.save(), good);
+
+    // One number or count at a time is replaced: what is not refused runs to an outcome.
+    std::mt19937_64 random(9);
+    Options limited = options;
+    limited.max_steps = 20'000;
+    for (int i = 0; i < 1000; ++i) {
+        Snapshot bad = good;
+        if (random() % 2 == 0) {
+            const std::array hostile{nan, infinity, -infinity, 1e308, -1.0, 5e-324, 0.0, 1e9};
+            bad.numbers[random() % bad.numbers.size()] = hostile[random() % hostile.size()];
+        } else {
+            const std::array<std::uint64_t, 5> hostile{2, 3, 255, 1u << 31, ~std::uint64_t{0}};
+            bad.counts[random() % bad.counts.size()] = hostile[random() % hostile.size()];
+        }
+        Simulation<Ball, X> other(ball, X{1, 0}, limited);
+        if (refusal([&] { other.restore(bad); }) != "accepted") continue;
+        const auto run = other.take();
+        EXPECT_TRUE(run.t >= 0 && run.t <= options.t_end) << i;
+    }
 }
 
 TEST(Snapshot, SampleTimesAreThoseOfTheRunThatGoesOn)

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "ricochet/learn/classifier.hpp"
+#include "ricochet/nn/model.hpp"
 
 namespace ricochet::learn::bouncing_ball_full_test {
 namespace {
@@ -28,6 +29,9 @@ TEST(BallTrainingInFull, AnyStepMissesNoFreshEventFromAnySeedAndTakesLessThanAMi
         EXPECT_LE(trained.report.fresh->miss_bound, 1e-4) << seed;
         EXPECT_GE(trained.report.fresh->cleared_share, 0.95) << seed;
         EXPECT_LE(trained.report.seconds, 60) << seed;
+        if (seed != ball_training(BallModel::any_step).seed) continue;
+        const Model stored = load_model(RICOCHET_MODELS "/bouncing-ball.safetensors");
+        EXPECT_EQ(to_safetensors(trained.model), to_safetensors(stored));
     }
 }
 

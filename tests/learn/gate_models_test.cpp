@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "problems/cavern.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "problems/planar_arm.hpp"
 #include "ricochet/detect/gates.hpp"
@@ -381,6 +382,11 @@ void expect_verified(const System& system, std::size_t inputs, const Options& op
 TEST(Foreseen, KeepsTheEventsOfAnArmWithAnyWeights)
 {
     expect_verified(PlanarArm<2>(), 4, {.t_end = 5, .step = 2e-3}, 2);
+}
+
+TEST(Foreseen, KeepsTheEventsOfACavernWithAnyWeights)
+{
+    expect_verified(Cavern({.segments = 1000}), 4, {.t_end = 20, .step = 2e-3}, 2);
 }
 
 TEST(Foreseen, KeepsTheEventsOfAnEigenvalueWithAnyWeights)

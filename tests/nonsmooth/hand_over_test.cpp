@@ -106,6 +106,43 @@ void reach_zero(const SlidingMode& system, double from, double exact_time)
     EXPECT_NEAR(run.state.reaction[0], -p.amplitude * std::sin(p.frequency * 0.5), 1e-13);
 }
 
+/// k t_end / n, k = 0 ... n.
+std::vector<double> evenly(double t_end, int n)
+{
+    std::vector<double> t;
+    for (int k = 0; k <= n; ++k) t.push_back(t_end * k / n);
+    return t;
+}
+
+TEST(HandOver, ErrorsOverTheWholeMotionFollowTheTolerance)
+{
+    // The root of the mean square over the motion; relative for the circuit.
+    const SlidingMode sliding;
+    const auto t = evenly(0.5, 5000);
+    const auto loose = hand_over(sliding, one(0.15),
+                                 {.t_end = 0.5, .rtol = 1e-4, .atol = 1e-4, .sample_times = t});
+    double square = 0;
+    for (std::size_t i = 0; i < t.size(); ++i) {
+        square += std::pow(loose.trajectory.x[i][0] - sliding.exact(t[i], 0.15), 2);
+    }
+    EXPECT_LE(std::sqrt(0.5 * square / 5000), 1.7e-4);
+
+    ExactCircuit exact;
+    exact.run(DiodeCircuit::start(), 20);
+    const auto times = evenly(20, 4000);
+    const auto run = hand_over(DiodeCircuit{}, DiodeCircuit::start(),
+                               {.t_end = 20, .rtol = 3e-8, .atol = 3e-8, .sample_times = times},
+                               ErrorControlled<Fehlberg78>{});
+    double error = 0;
+    double size = 0;
+    for (std::size_t i = 0; i < times.size(); ++i) {
+        const Eigen::Vector3d state = exact.state(times[i]);
+        error += (run.trajectory.x[i] - state).squaredNorm();
+        size += state.squaredNorm();
+    }
+    EXPECT_LE(std::sqrt(error / size), 1e-8);
+}
+
 TEST(HandOver, SlidingModeReachesZeroInTimeAndStaysThereToTheBit)
 {
     reach_zero(SlidingMode{}, 0.15, 0.093315472931294579027);

@@ -1,6 +1,7 @@
 // Scenes with expensive guards: their promises, along real runs.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -14,7 +15,9 @@
 #include "problems/opaque.hpp"
 #include "problems/planar_arm.hpp"
 #include "problems/zones.hpp"
+#include "ricochet/detect/gates.hpp"
 #include "ricochet/integrate/integrate.hpp"
+#include "ricochet/nn/model.hpp"
 #include "scene_bounds.hpp"
 
 namespace ricochet::scenes_test {
@@ -302,26 +305,51 @@ TEST(LeastEigenvalue, ItsTableBoundsItFromBothSidesAndClosely)
 
 TEST(LeastEigenvalue, ItsTableSavesChecksOnBothSidesAndKeepsTheEvents)
 {
-    const Options options{.t_end = 20, .step = 2e-3};
-    const auto planned = [&](const LeastEigenvalue& system) {
-        return integrate(system, system.start(), options, FixedStep<Rk4>{}, Planned{});
-    };
-    const LeastEigenvalue plain({.level = 1.55});
-    const LeastEigenvalue tabulated({.level = 1.55, .table = 6});
-    const auto every = integrate(plain, plain.start(), options, FixedStep<Rk4>{}, Extremum{});
-    const auto without = planned(plain);
-    const auto with = planned(tabulated);
-    ASSERT_GT(every.events.size(), 4U);
-    for (const auto* run : {&without, &with}) {
-        ASSERT_EQ(run->events.size(), every.events.size());
-        for (std::size_t i = 0; i < every.events.size(); ++i) {
-            EXPECT_EQ(run->events[i].t, every.events[i].t);
-            EXPECT_EQ(run->events[i].before, every.events[i].before);
+    for (const double level : {1.3, 1.55}) {
+        const Options options{.t_end = level < 1.5 ? 40.0 : 20, .step = level < 1.5 ? 4e-3 : 2e-3};
+        const auto planned = [&](const LeastEigenvalue& system) {
+            return integrate(system, system.start(), options, FixedStep<Rk4>{}, Planned{});
+        };
+        const LeastEigenvalue plain({.level = level});
+        const auto every = integrate(plain, plain.start(), options, FixedStep<Rk4>{}, Extremum{});
+        const auto without = planned(plain);
+        const auto with = planned(LeastEigenvalue({.level = level, .table = 8}));
+        ASSERT_GT(every.events.size(), 1U) << level;
+        for (const auto* run : {&without, &with}) {
+            ASSERT_EQ(run->events.size(), every.events.size());
+            for (std::size_t i = 0; i < every.events.size(); ++i) {
+                EXPECT_EQ(run->events[i].t, every.events[i].t);
+                EXPECT_EQ(run->events[i].before, every.events[i].before);
+            }
+            EXPECT_EQ(run->x, every.x);
         }
-        EXPECT_EQ(run->x, every.x);
+        EXPECT_LT(1.5 * static_cast<double>(with.statistics.guard_calls),
+                  static_cast<double>(without.statistics.guard_calls))
+            << level;
     }
-    EXPECT_LT(1.5 * static_cast<double>(with.statistics.guard_calls),
-              static_cast<double>(without.statistics.guard_calls));
+}
+
+TEST(LeastEigenvalue, ItsProvedNetworkSavesChecksAndKeepsTheEvents)
+{
+    const Model model = load_model(RICOCHET_MODELS "/eigenvalue-certified.safetensors");
+    EXPECT_EQ(why_void(model), "");
+    const LeastEigenvalue system;
+    const Options options{.t_end = 40, .step = 4e-3};
+    const auto run = [&](const auto& detector) {
+        return integrate(system, system.start(), options, FixedStep<Rk4>{}, detector);
+    };
+    const auto every = run(Extremum{});
+    const auto planned = run(Planned<>({.check_bounds = false}));
+    const auto proved = run(Certified<>(model, {.check_bounds = false}));
+    ASSERT_GT(every.events.size(), 1U);
+    ASSERT_EQ(proved.events.size(), every.events.size());
+    for (std::size_t i = 0; i < every.events.size(); ++i) {
+        EXPECT_EQ(proved.events[i].t, every.events[i].t);
+        EXPECT_EQ(proved.events[i].before, every.events[i].before);
+    }
+    EXPECT_EQ(proved.x, every.x);
+    EXPECT_LT(1.5 * static_cast<double>(proved.statistics.guard_calls),
+              static_cast<double>(planned.statistics.guard_calls));
 }
 
 TEST(LeastEigenvalue, RateIsTheDerivativeAlongTheMotion)
@@ -357,6 +385,61 @@ TEST(LeastEigenvalue, TheSlowFormHasTheSameValuesAndTakesItsTime)
     EXPECT_NE(refusal([] { LeastEigenvalue({.table = 49}); }).find("table"), std::string::npos);
     EXPECT_NE(refusal([] { LeastEigenvalue({.amplitude = 0}); }).find("amplitude"),
               std::string::npos);
+}
+
+/// Runs with a check at every step and planned: the same events, bit for bit. Returns the ratio of
+/// their exact calls.
+template <class Stepping, class System>
+double saved_by_planning(const System& system, const Options& options)
+{
+    const auto every = integrate(system, system.start(), options, Stepping{}, Extremum{});
+    const auto planned =
+        integrate(system, system.start(), options, Stepping{}, Planned<>({.check_bounds = false}));
+    EXPECT_EQ(every.outcome, Outcome::reached_end);
+    EXPECT_EQ(planned.outcome, every.outcome);
+    EXPECT_EQ(planned.events.size(), every.events.size());
+    EXPECT_GT(every.events.size(), 0U);
+    for (std::size_t i = 0; i < std::min(planned.events.size(), every.events.size()); ++i) {
+        EXPECT_EQ(planned.events[i].t, every.events[i].t);
+        EXPECT_EQ(planned.events[i].guard, every.events[i].guard);
+        EXPECT_EQ(planned.events[i].before, every.events[i].before);
+        EXPECT_EQ(planned.events[i].after, every.events[i].after);
+    }
+    EXPECT_EQ(planned.x, every.x);
+    return static_cast<double>(every.statistics.guard_calls) /
+           static_cast<double>(planned.statistics.guard_calls);
+}
+
+TEST(PlannedScenes, ACavernHasTheEventsOfACheckAtEveryStep)
+{
+    for (const bool skimming : {false, true}) {
+        const Cavern system(cavern(skimming, 10'000, Cavern::Search::tree));
+        saved_by_planning<FixedStep<Rk4>>(system, {.t_end = skimming ? 200.0 : 100, .step = 1e-3});
+        saved_by_planning<ErrorControlled<Dopri5>>(system,
+                                                   {.t_end = 500, .rtol = 1e-9, .atol = 1e-9});
+    }
+}
+
+double saved_on_eigenvalue(double level)
+{
+    return saved_by_planning<FixedStep<Rk4>>(LeastEigenvalue({.level = level}),
+                                             {.t_end = 20, .step = 1e-3});
+}
+
+TEST(PlannedScenes, AnEigenvalueIsComputedATwentyFifthAsOften)
+{
+    EXPECT_GE(saved_on_eigenvalue(1.3), 25);
+}
+
+TEST(PlannedScenes, AnEigenvalueWithManyEventsIsComputedATwentyFifthAsOften)
+{
+    EXPECT_GE(saved_on_eigenvalue(1.55), 25);
+}
+
+TEST(PlannedScenes, ZonesAndArmsHaveTheEventsOfACheckAtEveryStep)
+{
+    saved_by_planning<FixedStep<Rk4>>(Zones{}, {.t_end = 10, .step = 1e-3});
+    saved_by_planning<FixedStep<Rk4>>(PlanarArm<4>({.obstacles = 8}), {.t_end = 60, .step = 1e-3});
 }
 
 // --- arm ---

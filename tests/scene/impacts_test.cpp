@@ -30,10 +30,16 @@ TEST(Impacts, ACradleHandsTheVelocityToTheLastBall)
     for (int balls = 2; balls <= 9; ++balls) {
         const SceneRun run = simulate(cradle(balls), {.t_end = 4});
         ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+        double momentum = 0;
+        double energy = 0;
         for (int i = 0; i < balls; ++i) {
             const auto& body = run.bodies[static_cast<std::size_t>(i)];
             EXPECT_NEAR(body.velocity[0], i == balls - 1 ? 1 : 0, 1e-14) << balls << " " << i;
+            momentum += body.velocity[0];
+            energy += body.velocity[0] * body.velocity[0];
         }
+        EXPECT_NEAR(momentum, 1, 1e-14) << balls;
+        EXPECT_NEAR(energy, 1, 1e-14) << balls;
         EXPECT_EQ(run.statistics.events, 1u);
         EXPECT_EQ(run.statistics.impacts, static_cast<std::uint64_t>(balls - 1));
     }

@@ -1,4 +1,4 @@
-// Random systems against motions in long double; `ricochet_measure taylor` runs many more.
+// Random systems against motions in long double; random_flows_full_test.cpp runs many more.
 #include "taylor/random_flows.hpp"
 
 #include <gtest/gtest.h>

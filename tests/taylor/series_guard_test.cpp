@@ -139,7 +139,7 @@ TYPED_TEST(NearlyTangent, PairsOfCrossingsAreFoundDownToRoundingAndNoneIsInvente
     std::mt19937_64 random(2);
     std::uniform_real_distribution<double> phases(1, 1.9);
     for (const double depth : {1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13, 1e-14}) {
-        for (int k = 0; k < 50; ++k) {
+        for (int k = 0; k < 2000; ++k) {
             const double phase = phases(random);
             const Grazing::State x0{std::cos(phase), std::sin(phase)};
             // Half a turn before the crest, and less than one after.

@@ -1,6 +1,6 @@
-#include "measure_trainers.hpp"
-
-#include <fmt/format.h>
+// Both trainers of policies on a linear-quadratic regulator and on a pendulum that must be swung
+// up, and the time of the published networks.
+#include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
@@ -9,15 +9,13 @@
 #include <functional>
 #include <numbers>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "ricochet/detail/random.hpp"
 #include "ricochet/learn/policies.hpp"
 #include "ricochet/nn/mlp.hpp"
 
-namespace ricochet::bench {
-
+namespace ricochet::trainers_full_test {
 namespace {
 
 constexpr double discount = 0.9;
@@ -80,17 +78,17 @@ double relative_cost(const Model& policy)
     constexpr double a1 = 0.5 - discount / 4 - discount / 2;
     const double p = (-a1 + std::sqrt(a1 * a1 + 2 * a2)) / (2 * a2);
     const Mlp<float> network(policy);
-    Regulators world(1, 0);
+    Regulators regulator(1, 0);
     double cost = 0;
     double optimum = 0;
     for (double start = -1; start <= 1; start += 0.25) {
-        world.start(start);
+        regulator.start(start);
         double weight = 1;
         for (int k = 0; k < 200; ++k, weight *= discount) {
-            const auto in = static_cast<float>(world.x());
+            const auto in = static_cast<float>(regulator.x());
             float out = 0;
             network.forward(&in, &out);
-            cost -= weight * world.step(std::tanh(static_cast<double>(out)));
+            cost -= weight * regulator.step(std::tanh(static_cast<double>(out)));
         }
         optimum += p * start * start;
     }
@@ -100,21 +98,19 @@ double relative_cost(const Model& policy)
 using Train =
     std::function<learn::TrainedPolicy(const learn::Environment&, const learn::PolicyTraining&)>;
 
-/// The median of five seeds, with its line of output.
-double median_cost(const std::string& name, const Train& train, Measured& out)
+/// Of five seeds, ascending.
+std::vector<double> costs(const Train& train)
 {
-    std::vector<double> costs;
+    std::vector<double> out;
     for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-        Regulators world(1, 10);
+        Regulators regulator(1, 10);
         const learn::TrainedPolicy trained =
-            train(world.environment(),
+            train(regulator.environment(),
                   {.steps = 10'000, .batch = 128, .discount = discount, .seed = seed});
-        costs.push_back(relative_cost(trained.policy));
+        out.push_back(relative_cost(trained.policy));
     }
-    std::ranges::sort(costs);
-    out.details.push_back(fmt::format("{}: {:.4f} to {:.4f}, median {:.4f}", name, costs.front(),
-                                      costs.back(), costs[2]));
-    return costs[2];
+    std::ranges::sort(out);
+    return out;
 }
 
 /// Gymnasium's Pendulum-v1, reimplemented: angle th from upright and rate w,
@@ -168,17 +164,21 @@ private:
 };
 
 /// The mean of 100 episodes outside the training.
-double mean_return(const std::function<double(const std::vector<double>&)>& act)
+double mean_return(const Model& policy)
 {
+    const Mlp<float> network(policy);
     Pendulum pendulum;
-    const learn::Environment world = pendulum.environment();
+    const learn::Environment environment = pendulum.environment();
     std::vector<double> observation(3);
     double sum = 0;
     for (std::uint64_t episode = 0; episode < 100; ++episode) {
-        world.reset(1000 + episode, observation);
+        environment.reset(1000 + episode, observation);
         for (bool over = false; !over;) {
-            const double action = act(observation);
-            const learn::Reaction reaction = world.step(std::span(&action, 1), observation);
+            const std::vector<float> in(observation.begin(), observation.end());
+            float out = 0;
+            network.forward(in.data(), &out);
+            const double action = std::tanh(static_cast<double>(out));
+            const learn::Reaction reaction = environment.step(std::span(&action, 1), observation);
             sum += reaction.reward;
             over = reaction.truncated;
         }
@@ -186,70 +186,46 @@ double mean_return(const std::function<double(const std::vector<double>&)>& act)
     return sum / 100;
 }
 
-double mean_return(const Model& policy)
+TEST(TrainersInFull, LearnTheOptimalRegulatorToATenth)
 {
-    const Mlp<float> network(policy);
-    return mean_return([&network](const std::vector<double>& observation) {
-        const std::vector<float> in(observation.begin(), observation.end());
-        float out = 0;
-        network.forward(in.data(), &out);
-        return std::tanh(static_cast<double>(out));
-    });
+    for (const auto& found :
+         {costs([](const learn::Environment&environment, const learn::PolicyTraining&training) {
+              return learn::train_tqc(environment, {.training = training,
+                                                    .actor = {32, 32},
+                                                    .critic = {32, 32},
+                                                    .critics = 2,
+                                                    .rate = 1e-3});
+          }),
+          costs([](const learn::Environment&environment, const learn::PolicyTraining&training) {
+              return learn::train_td3(
+                  environment, {.training = training, .actor = {32, 32}, .critic = {32, 32}});
+          })}) {
+        EXPECT_GE(found.front(), 1 - 1e-6);  // nothing is better
+        EXPECT_LE(found[2], 1.1);
+    }
+}
+
+TEST(TrainersInFull, SwingUpAPendulum)
+{
+    Pendulum pendulum;
+    const learn::Environment environment = pendulum.environment();
+    const learn::PolicyTraining training{.steps = 8000};
+    EXPECT_GE(
+        mean_return(learn::train_tqc(environment, {.training = training, .rate = 1e-3}).policy),
+        -200);
+    EXPECT_GE(mean_return(learn::train_td3(environment, {.training = training}).policy), -200);
+}
+
+TEST(TrainersInFull, TwentyThousandStepsOfThePublishedNetworksTakeAMinuteAndAHalf)
+{
+    Regulators regulators(9, 50);
+    const std::clock_t start = std::clock();
+    const learn::TrainedPolicy trained =
+        learn::train_tqc(regulators.environment(), {.training = {.steps = 20'000, .threads = 2}});
+    EXPECT_EQ(trained.outcome, learn::PolicyOutcome::finished);
+    // Processor time of both threads.
+    EXPECT_LE(static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC, 90);
 }
 
 }  // namespace
-
-Measured time_of_tqc()
-{
-    Regulators world(9, 50);
-    const std::clock_t start = std::clock();
-    const learn::TrainedPolicy trained =
-        learn::train_tqc(world.environment(), {.training = {.steps = 20'000, .threads = 2}});
-    const double processor = static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-    const bool done = trained.outcome == learn::PolicyOutcome::finished;
-    // The time of both threads together: it exceeds that of two cores that are otherwise idle.
-    return {
-        .pass = done && processor <= 90,
-        .text = fmt::format("{:.1f} s of processor time of two threads, {:.1f} s on the clock ({})",
-                            processor, trained.seconds, name(best_instruction_set()))};
-}
-
-Measured cost_over_optimum()
-{
-    Measured out;
-    const double tqc = median_cost(
-        "TQC",
-        [](const learn::Environment& environment, const learn::PolicyTraining& training) {
-            return learn::train_tqc(environment, {.training = training,
-                                                  .actor = {32, 32},
-                                                  .critic = {32, 32},
-                                                  .critics = 2,
-                                                  .rate = 1e-3});
-        },
-        out);
-    const double td3 = median_cost(
-        "TD3",
-        [](const learn::Environment& environment, const learn::PolicyTraining& training) {
-            return learn::train_td3(environment,
-                                    {.training = training, .actor = {32, 32}, .critic = {32, 32}});
-        },
-        out);
-    out.pass = std::max(tqc, td3) <= 1.1 && std::min(tqc, td3) >= 1 - 1e-6;
-    out.text = fmt::format("TQC {:.4f}, TD3 {:.4f}", tqc, td3);
-    return out;
-}
-
-Measured swing_up()
-{
-    Pendulum pendulum;
-    const learn::Environment world = pendulum.environment();
-    const learn::PolicyTraining training{.steps = 8000};
-    const double idle = mean_return([](const std::vector<double>&) { return 0.0; });
-    const double tqc =
-        mean_return(learn::train_tqc(world, {.training = training, .rate = 1e-3}).policy);
-    const double td3 = mean_return(learn::train_td3(world, {.training = training}).policy);
-    return {.pass = std::min(tqc, td3) >= -200,
-            .text = fmt::format("TQC {:.1f}, TD3 {:.1f}; without acting {:.1f}", tqc, td3, idle)};
-}
-
-}  // namespace ricochet::bench
+}  // namespace ricochet::trainers_full_test
