@@ -2,7 +2,8 @@
 
     pip install --no-build-isolation .
 
-needs CMake, a C++20 compiler, Eigen, Boost, fmt, nlohmann-json, pybind11 and NumPy, and no network.
+needs CMake, a C++20 compiler, Eigen, Boost, fmt, nlohmann-json, NumPy and pybind11 (2.10, or 2.12
+with NumPy 2), and no network. Without --no-build-isolation pip fetches the newest of the last two.
 """
 
 import os
@@ -23,6 +24,7 @@ class CMakeBuild(build_ext):
         configure = [
             "cmake", "-S", str(SOURCE), "-B", str(build), "-DCMAKE_BUILD_TYPE=Release",
             f"-DPython_EXECUTABLE={sys.executable}", "-DRICOCHET_PYTHON=ON",
+            "-DRICOCHET_PYTHON_REQUIRED=ON",
             *(f"-DRICOCHET_{part}=OFF" for part in (
                 "FAULTS", "LEARN", "BUILD_APP", "BUILD_TESTS", "BUILD_EXAMPLES", "INSTALL")),
             *os.environ.get("CMAKE_ARGS", "").split(),

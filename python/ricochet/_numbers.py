@@ -60,6 +60,7 @@ def number_from(given, what):
     try:
         if np.asarray(given).dtype.kind in "cmM":
             raise TypeError
-        return float(given)
+        # NumPy turns an array into a float only where it has no dimensions.
+        return float(given.item() if isinstance(given, np.ndarray) else given)
     except (TypeError, ValueError, OverflowError):
         raise TypeError(f"{what}: found {given!r}, expected a number") from None

@@ -47,7 +47,7 @@ class Ready:
         super().__setattr__(name, value)
 
     def _known(self, what, *arguments):
-        return _ricochet.closed_form(self._source, what, [float(a) for a in arguments])
+        return _ricochet.closed_form(self._source, what, [number_from(a, what) for a in arguments])
 
     def __repr__(self):
         given = ", ".join(f"{name}={value!r}" for name, value in self._parameters.items())

@@ -305,11 +305,16 @@ private:
     /// Whether the limits of the options allow further steps; also sets when to ask next.
     [[gnu::noinline]] bool may_take_more_steps();
 
-    /// Whether time has hardly advanced since the last review.
+    /// Whether the time has hardly advanced since the last review, or, without an event, so little
+    /// that not even a thousand times `max_steps` would reach the end.
     [[nodiscard]] bool stands_still() const noexcept
     {
         const double span = std::fabs(options_.t_end - options_.t_start);
-        return std::fabs(step_.until(reviewed_)) < 1e-9 * span;
+        const double part = static_cast<double>(options_.stall_steps) /
+                            (1e3 * static_cast<double>(options_.max_steps));
+        const bool has_events = run_.statistics.events != reviewed_events_;
+        return std::fabs(step_.until(reviewed_)) <
+               (has_events ? 1e-9 : std::max(1e-9, part)) * span;
     }
 
     /// Ends the run after a failed step.
@@ -522,6 +527,7 @@ private:
     std::size_t careful_steps_ = 0;  ///< number of steps still to take without looking ahead
     std::uint64_t next_review_ = 0;  ///< number of steps at which to compare with the options
     double reviewed_ = 0;            ///< [s] time of the last review
+    std::uint64_t reviewed_events_ = 0;
     bool is_last_ = false;
     int calm_steps_ = 0;  ///< number of consecutive steps without an event
     std::size_t next_sample_ = 0;

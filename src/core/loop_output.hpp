@@ -9,10 +9,19 @@ template <class X, bool single>
 inline void Loop<X, single>::emit_samples(double s, double end)
 {
     const auto& times = options_.sample_times;
-    while (next_sample_ < times.size() && lies_before(times[next_sample_], end)) {
+    const auto holds = [&](std::size_t k) {
+        return k < times.size() && lies_before(times[k], end);
+    };
+    if (!holds(next_sample_)) return;
+    const std::size_t most_alone = step_.most_sampled_alone();
+    const bool on_polynomial =
+        most_alone < times.size() - next_sample_ && holds(next_sample_ + most_alone);
+    while (holds(next_sample_)) {
         const double offset = std::min(step_.until(times[next_sample_]), s);
         X x = step_.x0();
-        if (offset > 0) step_.sample(offset, options_.rtol, options_.atol, x);
+        if (offset > 0) {
+            step_.sample(offset, {options_.rtol, options_.atol, on_polynomial}, x);
+        }
         add_sample(std::move(x));
     }
 }

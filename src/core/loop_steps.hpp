@@ -89,6 +89,7 @@ bool Loop<X, single>::may_take_more_steps()
         end(Outcome::stalled);
     }
     reviewed_ = step_.start().value;
+    reviewed_events_ = run_.statistics.events;
     const std::uint64_t stride = options_.stall_steps;
     next_review_ =
         stride > 0 && options_.max_steps - steps > stride ? steps + stride : options_.max_steps;

@@ -122,7 +122,7 @@ public:
         const double h = step.h();
         const bool first = checked_ != Checked::everywhere;
         for (std::size_t i = 0; i < size(); ++i) {
-            const double e = cubic(i, h).deviation(u, further_[i]);
+            const double e = deviation(cubic(i, h), i, h, u, further_[i]);
             worst_[i] = !first && !(worst_[i] <= e) ? worst_[i] : e;  // NaN stays
         }
         checked_ = Checked::everywhere;
@@ -173,7 +173,7 @@ public:
     {
         const auto needs = [this, h](std::size_t i) {
             const CubicCheck look = cubic(i, h);
-            const double e = look.deviation(CubicCheck::inside, inside_[i]);
+            const double e = deviation(look, i, h, CubicCheck::inside, inside_[i]);
             return sign_[i] != 0 && !(0x1p30 * e <= look.size());
         };
         if (marked_) return std::any_of(marks_.begin(), marks_.end(), needs);
@@ -201,7 +201,7 @@ public:
     [[nodiscard]] bool hides(std::size_t i, double h) const noexcept
     {
         const CubicCheck look = cubic(i, h);
-        return !(look.lowest(sign_[i]) > CubicCheck::most * deviation(look, i));
+        return !(look.lowest(sign_[i]) > CubicCheck::most * deviation(look, i, h));
     }
 
     /// Whether guard i agrees in the step with the cubic through its ends, as far as it has
@@ -211,14 +211,14 @@ public:
         if (has_series(i)) return false;
         if (!checked()) return true;
         const CubicCheck look = cubic(i, h);
-        return 0x1p16 * deviation(look, i) <= look.size();
+        return 0x1p16 * deviation(look, i, h) <= look.size();
     }
 
     /// Whether guard i differs in the step from the cubic through its ends by so little that their
     /// roots lie within a millionth of the step, as far as it has been evaluated.
     [[nodiscard]] bool is_cubic(std::size_t i, double h) const noexcept
     {
-        return checked() && 0x1p20 * deviation(cubic(i, h), i) <= std::fabs(g1_[i] - g0_[i]);
+        return checked() && 0x1p20 * deviation(cubic(i, h), i, h) <= std::fabs(g1_[i] - g0_[i]);
     }
 
     /// Whether the guards have been evaluated inside the step.
@@ -502,13 +502,29 @@ protected:
     }
 
     /// Largest deviation found of guard i from the cubic through its ends.
-    [[nodiscard]] double deviation(const CubicCheck& look, std::size_t i) const noexcept
+    [[nodiscard]] double deviation(const CubicCheck& look, std::size_t i, double h) const noexcept
     {
-        const double e = look.deviation(CubicCheck::inside, inside_[i]);
+        const double e = deviation(look, i, h, CubicCheck::inside, inside_[i]);
         if (checked_ == Checked::inside) return e;
-        const double other =
-            checked_everywhere() ? worst_[i] : look.deviation(CubicCheck::further, further_[i]);
+        const double other = checked_everywhere()
+                                 ? worst_[i]
+                                 : deviation(look, i, h, CubicCheck::further, further_[i]);
         return other <= e ? e : other;  // NaN stays
+    }
+
+    /// Deviation of guard i from its cubic `look` at the part `u`, where it is `value`.
+    [[nodiscard]] double deviation(const CubicCheck& look, std::size_t i, double h, double u,
+                                   double value) const noexcept
+    {
+        const double e = look.deviation(u, value);
+        return is_finite(e) ? e : deviation_of_large(i, h, u, value);
+    }
+    [[nodiscard, gnu::noinline]] double deviation_of_large(std::size_t i, double h, double u,
+                                                           double value) const noexcept
+    {
+        constexpr double unit = CubicCheck::large_unit;
+        const CubicCheck look(g0_[i] / unit, rate0_[i] / unit, g1_[i] / unit, rate1_[i] / unit, h);
+        return unit * look.deviation(u, value / unit);
     }
 
     /// Whether the series of guard i proves that the guard stays on the side that it ends on.

@@ -214,13 +214,27 @@ public:
         add_tangent(s, x);
     }
 
-    /// x(t0 + s) as accurately as is possible at low cost: by dense output of the method's own
-    /// order, or by a step of its own.
-    void sample(double s, double rtol, double atol, X& x) const
+    /// The most samples of the step that are computed by steps of their own. More are taken from
+    /// its polynomial, whose inner nodes cost a step each. A cubic has none, but also a larger
+    /// error than a step: few samples are worth the calls. Where the polynomial is not of the
+    /// method's order, or may be rough, every sample is a step.
+    [[nodiscard]] std::size_t most_sampled_alone() const noexcept
     {
-        if (kernel_->sample && kernel_->sample(system_.door(), state_, s, rtol, atol, x)) {
+        if (kernel_->order > 8 || may_be_rough()) return std::numeric_limits<std::size_t>::max();
+        const DenseNodes nodes = dense_nodes();
+        return nodes == DenseNodes::end ? 2 : inner_nodes(nodes);
+    }
+
+    struct Sampling {
+        double rtol, atol;
+        bool on_polynomial;  ///< samples are taken from the polynomial of the step
+    };
+    /// x(t0 + s) on a dense output of the method's own order, or by a step of its own.
+    void sample(double s, const Sampling& by, X& x) const
+    {
+        if (kernel_->sample && kernel_->sample(system_.door(), state_, s, by.rtol, by.atol, x)) {
             add_tangent(s, x);
-        } else if (kernel_->interpolates()) {
+        } else if (kernel_->interpolates() || by.on_polynomial) {
             interpolate(s, x);
         } else {
             restep(s, x);

@@ -40,17 +40,24 @@ void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const Guar
                            double smallest, int depth)
 {
     const double width = end.s - start.s;
-    const CubicCheck look(start.value, start.rate, end.value, end.rate, width);
+    const auto cubic_in = [&](double unit) {
+        return CubicCheck(start.value / unit, start.rate / unit, end.value / unit, end.rate / unit,
+                          width);
+    };
+    CubicCheck look = cubic_in(1);
+    const bool large = !std::isfinite(4 * look.size());  // of which terms may overflow
+    const double unit = large ? CubicCheck::large_unit : 1;
+    if (large) look = cubic_in(unit);
     double deviation = 0;
     for (const double u : {CubicCheck::inside, CubicCheck::further}) {
-        const double e = look.deviation(u, path.dense_value(start.s + u * width).value);
+        const double e = look.deviation(u, path.dense_value(start.s + u * width).value / unit);
         deviation = e <= deviation ? deviation : e;  // NaN stays
     }
     if (start.s == whole_.start.s && end.s == whole_.end.s) {
         nearly_cubic_ = CubicCheck::most * deviation <= look.size();
     }
     if (look.stays_clear(deviation) || look.keeps_shape(deviation)) return;
-    if (look.size() + deviation <= declared_touch_) return;
+    if (look.size() + deviation <= declared_touch_ / unit) return;
     const double at = start.s + cut * width;
     if (width <= smallest || !(at > start.s && at < end.s)) {
         // A kink keeps its shape on any part, however short.
@@ -59,14 +66,14 @@ void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const Guar
     }
     // Rounding does not scale; if the guard decays, it is smaller here than where it was asked for.
     if (depth >= shallow && !(noise_ >= 0)) noise_ = path.blur(end.s);
-    if (deviation <= noise_) noise_ = path.blur(end.s);
-    if (deviation <= noise_) return;
+    if (deviation <= noise_ / unit) noise_ = path.blur(end.s);
+    if (deviation <= noise_ / unit) return;
     const GuardSample middle = path.dense_value_and_rate(at);
     divided_ = true;
     divide(path, start, middle, smallest, depth + 1);
     // A node that cannot be distinguished from the surface is not used as the end of a part.
     constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
-    const double touch = std::max(declared_touch_, ulps * look.size());
+    const double touch = std::max(declared_touch_, ulps * unit * look.size());
     if (std::fabs(middle.value) > std::max(noise_, touch)) keep(middle);
     divide(path, middle, end, smallest, depth + 1);
 }

@@ -75,8 +75,9 @@ std::string_view describe(Outcome outcome) noexcept
                    "left the mode as it was; write into the components that are there, or declare "
                    "`static constexpr bool changes_dimension = true`";
         case Outcome::stalled:
-            return "stall_steps steps advanced the time by less than 1e-9 of the span; end the run "
-                   "earlier, let events that accumulate come to rest, or raise stall_steps";
+            return "stall_steps steps hardly advanced the time; end the run earlier, let events "
+                   "that "
+                   "accumulate come to rest, or raise max_steps or stall_steps";
         case Outcome::stopped_by_callback:
             return "a function of the system reported an error; all that was computed before is "
                    "kept, and the next call continues from the last completed step";

@@ -10,6 +10,7 @@
 #include "random_guards.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/integrate/integrate.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
 
 namespace ricochet::resolved_guard_test {
@@ -183,6 +184,51 @@ struct FourCrossings {
     }
     [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.crossing = Crossing::either}; }
 };
+
+/// A guard of the given size, which a swinging state crosses, or with a lead does not.
+struct Sized {
+    double unit = 1;
+    double lead = 0;
+    using State = std::array<double, 2>;
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -x[0]}; }
+    [[nodiscard]] double guard(double, const State& x) const { return unit * (lead + x[0] / 2); }
+    [[nodiscard]] GuardInfo guard_info() const
+    {
+        return {.crossing = Crossing::either, .resets = false};
+    }
+};
+
+TEST(ResolvedGuards, HugeOnesAreCheckedAsThoseOfSizeOne)
+{
+    // 0x1.cp1023 is 1.6e308, so that the guard reaches 1.57e308. A power of two in the unit changes
+    // no bit of a guard, of its rate and of a comparison. Where terms overflow a step may take a
+    // second evaluation inside it; divided to the end it would take 12 000.
+    for (const double lead : {0.0, 0.475}) {
+        const auto run_in = [&](double unit) {
+            return integrate(Sized{unit, lead}, {1.0, 0.0}, {.t_end = 30});
+        };
+        const auto one = run_in(0x1.cp0);
+        const auto huge = run_in(0x1.cp1023);
+        ASSERT_EQ(huge.events.size(), one.events.size());
+        for (std::size_t k = 0; k < one.events.size(); ++k) {
+            EXPECT_EQ(huge.events[k].t, one.events[k].t);
+        }
+        EXPECT_EQ(huge.x, one.x);
+        EXPECT_EQ(one.events.size(), 10U);
+        EXPECT_LE(huge.statistics.guard_calls, one.statistics.guard_calls + one.statistics.steps);
+    }
+}
+
+TEST(ResolvedGuards, HugeOnesOfAStateThatHardlyMovesAreNotDivided)
+{
+    // The drop is lost in the rounding of the height; at most the eight places of a step where
+    // nothing moves are looked at, and both ends.
+    const auto run = integrate(BouncingBall(), {1e308, 0.0}, {.t_end = 20.5});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.x[0], 1e308);
+    EXPECT_LE(run.statistics.guard_calls, 12 * run.statistics.steps + 4);
+    EXPECT_EQ(run.statistics.unresolved_steps, 0U);
+}
 
 TEST(ResolvedGuards, FourCrossingsInOneStepAreFourEvents)
 {

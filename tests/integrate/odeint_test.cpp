@@ -117,6 +117,21 @@ TEST(Odeint, ItsOtherOneStepMethodsWork)
     EXPECT_NEAR(step.x1()[0], std::cos(0.01), 1e-8);
 }
 
+TEST(Odeint, ManySamplesOfItsSteppersAreOnTheDenseOutputLikeThoseOfOurs)
+{
+    struct Oscillator {
+        void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -x[0]}; }
+    };
+    Options options{.t_end = 20, .rtol = 1e-10, .atol = 1e-12};
+    for (int k = 0; k < 500; ++k) options.sample_times.push_back(0.04 * k);
+    const X x0 = {1.0, 0.0};
+    const auto ours = integrate(Oscillator{}, x0, options, ErrorControlled<Fehlberg78>{});
+    const auto theirs = integrate(Oscillator{}, x0, options,
+                                  ErrorControlled<Odeint<odeint::runge_kutta_fehlberg78>>{});
+    EXPECT_EQ(theirs.statistics.flow_calls, ours.statistics.flow_calls);
+    EXPECT_EQ(theirs.trajectory.x, ours.trajectory.x);
+}
+
 TEST(Odeint, ADepartureFromTheTangentIsTheSameStep)
 {
     // The same step by odeint on the state itself; the two differ by rounding.

@@ -545,6 +545,37 @@ def test_plain_numbers_and_arrays_give_the_same_run(options):
     assert plain.statistics.steps == other.statistics.steps
 
 
+@pytest.mark.parametrize("wrap", [np.array, np.atleast_1d, np.atleast_2d,
+                                  lambda value: np.array([value], dtype=object)])
+@pytest.mark.parametrize("options", [{}, {"detector": "planned"}, {"t_start": 3.5, "t_end": 0.0}])
+def test_functions_may_return_an_array_of_one_number(wrap, options):
+    """NumPy does not turn these into floats from 2.4 on."""
+    def run_with(wrap):
+        floor = ricochet.Guard(
+            lambda t, x: wrap(x[0]), reset=lambda t, x: [0.0, -0.8 * x[1]],
+            rate=lambda t, x, dxdt: wrap(dxdt[0]), enabled=lambda t, x: wrap(t > 0.5),
+            speed_bound=lambda t, x: wrap(abs(x[1])), acceleration_bound=lambda t, x: wrap(9.81),
+            lower_bound=lambda t, x: wrap(x[0]), upper_bound=lambda t, x: wrap(x[0]))
+        system = ricochet.System(
+            fall, [floor], next_time_event=lambda t: wrap(3.0 if t < 3 else math.inf),
+            previous_time_event=lambda t: wrap(3.0 if t > 3 else -math.inf),
+            time_reset=lambda t, x: x + [0.5, 0.0])
+        return ricochet.integrate(system, [2.0, 0.0], **{"t_end": wrap(3.5), **options})
+
+    plain, other = run_with(float), run_with(wrap)
+    assert len(plain.events) > 1
+    assert other.events.tobytes() == plain.events.tobytes()
+    assert np.array_equal(other.x, plain.x)
+
+
+def test_an_event_of_scipy_may_return_a_slice_of_the_state():
+    def low(t, y):
+        return y[:1] - 0.5
+
+    run = ricochet.solve_ivp(lambda t, y: -y, (0, 1), [1.0], events=low)
+    assert run.t_events[0] == pytest.approx([math.log(2)], rel=1e-3)
+
+
 def test_functions_of_a_guard_may_have_names_of_their_own():
     class Tank(ricochet.System):
         def flow(self, t, x):

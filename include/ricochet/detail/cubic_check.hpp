@@ -39,6 +39,10 @@ struct CubicCheck {
     /// at `inside` one time in a thousand.
     static constexpr double doubt = 1024;
 
+    /// Terms of guards above 1e306 overflow. Such guards are compared in a unit of this size, a
+    /// power of two, which changes no bit of a result.
+    static constexpr double large_unit = 0x1p600;
+
     double v0, b1, b2, v1;  ///< control points
 
     CubicCheck(double g0, double rate0, double g1, double rate1, double width) noexcept

@@ -1,5 +1,4 @@
 // Ensembles of ready systems.
-#include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -17,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "arrays.hpp"
 #include "background.hpp"
 #include "bindings.hpp"
 #include "read_request.hpp"
@@ -24,8 +24,6 @@
 #include "ricochet/ensemble.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "setup.hpp"
-
-namespace py = pybind11;
 
 namespace ricochet::python {
 
@@ -101,12 +99,6 @@ struct Columns {
     std::vector<std::uint32_t> mode;
     std::vector<std::uint64_t> counts;
 };
-
-template <class T>
-py::array_t<T> array_of(const std::vector<T>& values)
-{
-    return py::array_t<T>(static_cast<py::ssize_t>(values.size()), values.data());
-}
 
 Background<EnsembleProgress>::Show shower(const py::object& progress)
 {

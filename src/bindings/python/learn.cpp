@@ -1,6 +1,5 @@
 // The module `_learn`: training and certification, for python/ricochet/_training.py.
 
-#include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
@@ -18,13 +17,12 @@
 #include <utility>
 #include <vector>
 
+#include "arrays.hpp"
 #include "background.hpp"
 #include "door_system.hpp"
 #include "ricochet/learn/certify.hpp"
 #include "ricochet/learn/train.hpp"
 #include "ricochet/nn/model.hpp"
-
-namespace py = pybind11;
 
 namespace ricochet::python {
 
@@ -386,10 +384,11 @@ private:
 {
     const Interpreter held(true);
     try {
-        const auto size = static_cast<py::ssize_t>(n);
-        const py::object result =
-            b ? function(py::array_t<double>(size, a), py::array_t<double>(size, b))
-              : function(py::array_t<double>(size, a));
+        const auto array = [n](const double* data) { return array_of(std::span(data, n)); };
+        py::object result = b ? function(array(a), array(b)) : function(array(a));
+        if (py::isinstance<py::array>(result) && py::cast<py::ssize_t>(result.attr("size")) == 1) {
+            result = result.attr("item")();
+        }
         if (!py::isinstance<py::float_>(result) && !PyNumber_Check(result.ptr())) {
             throw py::type_error(std::string(what) + " returned " +
                                  py::cast<std::string>(py::repr(result)) + ", expected a number");

@@ -1,6 +1,5 @@
 // Events of a motion that a host in Python integrates.
 
-#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include <array>
@@ -13,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "numbers.hpp"
 #include "read_request.hpp"
@@ -309,11 +309,6 @@ private:
         if (!ended_) run.outcome = Outcome::cancelled;
         out.record = record_of(std::move(run));
         return out;
-    }
-
-    [[nodiscard]] static py::array array_of(const State& x)
-    {
-        return py::array_t<double>(static_cast<py::ssize_t>(x.size()), x.data());
     }
 
     static void require_size(const char* name, const Given& given, std::size_t n)

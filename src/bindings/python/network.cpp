@@ -1,6 +1,5 @@
 #include "network.hpp"
 
-#include <pybind11/numpy.h>
 #include <pybind11/stl.h>
 
 #include <algorithm>
@@ -13,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "results.hpp"
 #include "ricochet/nn/model.hpp"
@@ -50,8 +50,9 @@ public:
     template <class T, class Answer>
     [[nodiscard]] py::object answers(const Answer& answer) const
     {
-        py::array_t<T> out(single_ ? std::vector<py::ssize_t>{} : std::vector<py::ssize_t>{count_});
-        T* const to = out.mutable_data();
+        py::array out =
+            new_array<T>(single_ ? std::vector<py::ssize_t>{} : std::vector<py::ssize_t>{count_});
+        T* const to = static_cast<T*>(out.mutable_data());
         {
             const py::gil_scoped_release others;
             for (py::ssize_t i = 0; i < count_; ++i) to[i] = answer(row(i));
@@ -62,9 +63,9 @@ public:
     [[nodiscard]] py::array logits(const Classifier& classifier) const
     {
         const auto width = static_cast<py::ssize_t>(classifier.outputs());
-        py::array_t<double> out(single_ ? std::vector<py::ssize_t>{width}
-                                        : std::vector<py::ssize_t>{count_, width});
-        double* const to = out.mutable_data();
+        py::array out = new_array<double>(single_ ? std::vector<py::ssize_t>{width}
+                                                  : std::vector<py::ssize_t>{count_, width});
+        auto* const to = static_cast<double*>(out.mutable_data());
         const py::gil_scoped_release others;
         for (py::ssize_t i = 0; i < count_; ++i) classifier.logits(row(i), to + i * width);
         return out;
@@ -82,19 +83,10 @@ private:
     py::ssize_t count_ = 0;
 };
 
-/// Numbers of a model, which `owner` keeps alive.
-[[nodiscard]] py::array numbers_in(const std::vector<double>& numbers,
-                                   std::vector<py::ssize_t> shape, const py::handle& owner)
-{
-    py::array out(py::dtype::of<double>(), std::move(shape), numbers.data(), owner);
-    py::detail::array_proxy(out.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
-    return out;
-}
-
 [[nodiscard]] py::array pairs(const std::vector<Interval>& intervals)
 {
-    py::array_t<double> out({static_cast<py::ssize_t>(intervals.size()), py::ssize_t{2}});
-    double* to = out.mutable_data();
+    py::array out = new_array<double>({static_cast<py::ssize_t>(intervals.size()), 2});
+    auto* to = static_cast<double*>(out.mutable_data());
     for (const Interval& interval : intervals) {
         *to++ = interval.lower;
         *to++ = interval.upper;
@@ -125,8 +117,8 @@ private:
     for (const DenseLayer& layer : model_of(self).layers) {
         const auto inputs = static_cast<py::ssize_t>(layer.inputs);
         const auto outputs = static_cast<py::ssize_t>(layer.outputs);
-        out.append(py::make_tuple(numbers_in(layer.weight, {outputs, inputs}, self),
-                                  numbers_in(layer.bias, {outputs}, self)));
+        out.append(py::make_tuple(view_of(layer.weight.data(), {outputs, inputs}, self),
+                                  view_of(layer.bias.data(), {outputs}, self)));
     }
     return out;
 }
@@ -245,14 +237,14 @@ void bind_network(py::module_& module)
             "offset",
             [](const py::object& self) {
                 const auto& offset = model_of(self).offset;
-                return numbers_in(offset, {static_cast<py::ssize_t>(offset.size())}, self);
+                return view_of(offset.data(), {static_cast<py::ssize_t>(offset.size())}, self);
             },
             "What is subtracted from the features.")
         .def_property_readonly(
             "scale",
             [](const py::object& self) {
                 const auto& scale = model_of(self).scale;
-                return numbers_in(scale, {static_cast<py::ssize_t>(scale.size())}, self);
+                return view_of(scale.data(), {static_cast<py::ssize_t>(scale.size())}, self);
             },
             "What they are multiplied with then.")
         .def_property_readonly(

@@ -45,6 +45,17 @@ double as_guard(PyObject* result, const std::string& who)
     require_numpy();
     if (PyFloat_Check(result)) return PyFloat_AS_DOUBLE(result);
     if (is_truth(result)) return PyObject_IsTrue(result) ? 1 : -1;
+    if (PyArray_Check(result)) {
+        // NumPy turns an array into a float only where it has no dimensions.
+        auto* array = reinterpret_cast<PyArrayObject*>(result);
+        if (PyArray_SIZE(array) != 1) {
+            raise(PyExc_TypeError, who + " returned an array of " +
+                                       std::to_string(PyArray_SIZE(array)) +
+                                       " numbers, expected a number");
+        }
+        const Ref element = checked(PyArray_ToScalar(PyArray_DATA(array), array));
+        if (!PyArray_Check(element.get())) return as_guard(element.get(), who);
+    }
     if (!PyComplex_Check(result) && !PyArray_IsScalar(result, ComplexFloating) &&
         result != Py_None) {
         const double number = PyFloat_AsDouble(result);

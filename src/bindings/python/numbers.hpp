@@ -16,7 +16,7 @@ namespace ricochet::python {
 /// Name of the type of an object.
 [[nodiscard]] std::string type_of(PyObject* object);
 
-/// One number that a callback has returned; true counts as 1, false as -1.
+/// One number that a callback has returned, or an array of one; true counts as 1, false as -1.
 /// @throws PythonError naming `who` returned something else
 [[nodiscard]] double as_guard(PyObject* result, const std::string& who);
 

@@ -12,21 +12,13 @@
 #include <optional>
 #include <utility>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "ricochet/integrate/run.hpp"
 
 namespace ricochet::python {
 
 namespace {
-
-/// A read-only array over memory of `owner`.
-[[nodiscard]] py::array view(const py::dtype& type, std::vector<py::ssize_t> shape,
-                             std::vector<py::ssize_t> strides, const void* data, py::handle owner)
-{
-    py::array out(type, std::move(shape), std::move(strides), data, owner);
-    py::detail::array_proxy(out.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
-    return out;
-}
 
 [[nodiscard]] py::dtype make_event_type(std::size_t width)
 {
@@ -178,8 +170,7 @@ py::array PySolution::at(const py::object& t, bool before) const
     }
     const py::array_t<double, py::array::c_style | py::array::forcecast> times(t);
     if (times.ndim() == 0) {
-        const State x = evaluate(*times.data());
-        return py::array_t<double>(static_cast<py::ssize_t>(x.size()), x.data());
+        return array_of(evaluate(*times.data()));
     }
     if (times.ndim() != 1) {
         throw py::value_error("t: found " + std::to_string(times.ndim()) +
@@ -192,23 +183,21 @@ py::array PySolution::at(const py::object& t, bool before) const
         width = std::max(width, states.back().size());
     }
     if (states.empty()) width = evaluate(solution->time(0)).size();
-    const auto rows = static_cast<py::ssize_t>(width);
-    py::array_t<double> numbers({rows, times.size()});
-    for (py::ssize_t k = 0; k < times.size(); ++k) {
-        const State& x = states[static_cast<std::size_t>(k)];
-        for (py::ssize_t i = 0; i < rows; ++i) {
-            const auto c = static_cast<std::size_t>(i);
-            numbers.mutable_at(i, k) =
-                c < x.size() ? x[c] : std::numeric_limits<double>::quiet_NaN();
+    py::array columns = new_array<double>({static_cast<py::ssize_t>(width), times.size()});
+    auto* at = static_cast<double*>(columns.mutable_data());
+    for (std::size_t i = 0; i < width; ++i) {
+        for (const State& x : states) {
+            *at++ = i < x.size() ? x[i] : std::numeric_limits<double>::quiet_NaN();
         }
     }
-    return py::array(std::move(numbers));
+    return columns;
 }
 
 py::array events_of(const Record& record, const py::handle& owner)
 {
-    return view(event_type(record.width), {static_cast<py::ssize_t>(record.event_count)},
-                {static_cast<py::ssize_t>(8 * record.event_stride())}, record.events.data(), owner);
+    return view_of(event_type(record.width), {static_cast<py::ssize_t>(record.event_count)},
+                   {static_cast<py::ssize_t>(8 * record.event_stride())}, record.events.data(),
+                   owner);
 }
 
 void raise_with(const PythonError& error, PyRun&& run)
@@ -251,7 +240,7 @@ void bind_results(py::module_& module)
                 for (std::size_t k = 0; k <= self.solution->size(); ++k) {
                     times.push_back(self.solution->time(k));
                 }
-                return py::array_t<double>(static_cast<py::ssize_t>(times.size()), times.data());
+                return array_of(times);
             },
             "When the steps start, and the end of the last.")
         .def_property_readonly(
@@ -318,8 +307,7 @@ void bind_results(py::module_& module)
             "x",
             [self_of](const py::object& self) {
                 const Record& r = self_of(self).record;
-                return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.x.size())}, {8},
-                            r.x.data(), self);
+                return view_of(r.x.data(), {static_cast<py::ssize_t>(r.x.size())}, self);
             },
             "The state at that time.")
         .def_property_readonly(
@@ -369,18 +357,17 @@ void bind_results(py::module_& module)
             "times",
             [self_of](const py::object& self) {
                 const Record& r = self_of(self).record;
-                return view(py::dtype::of<double>(), {static_cast<py::ssize_t>(r.times.size())},
-                            {8}, r.times.data(), self);
+                return view_of(r.times.data(), {static_cast<py::ssize_t>(r.times.size())}, self);
             },
             "The times of `states`: sample times, or the ends of steps.")
         .def_property_readonly(
             "states",
             [self_of](const py::object& self) {
                 const Record& r = self_of(self).record;
-                const auto width = static_cast<py::ssize_t>(r.width);
-                return view(py::dtype::of<double>(),
-                            {static_cast<py::ssize_t>(r.times.size()), width}, {8 * width, 8},
-                            r.states.data(), self);
+                return view_of(
+                    r.states.data(),
+                    {static_cast<py::ssize_t>(r.times.size()), static_cast<py::ssize_t>(r.width)},
+                    self);
             },
             "States, one a row; shorter ones end in NaN.")
         .def_property_readonly(

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "read_request.hpp"
 #include "results.hpp"
@@ -231,8 +232,7 @@ public:
     [[nodiscard]] py::array x()
     {
         const Turn turn(in_use_, "Simulation");
-        const State& x = loop_->x();
-        return py::array_t<double>(static_cast<py::ssize_t>(x.size()), x.data());
+        return array_of(loop_->x());
     }
     [[nodiscard]] py::object mode()
     {
