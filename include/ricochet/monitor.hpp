@@ -319,6 +319,7 @@ public:
     /// a cut at a time event.
     [[nodiscard]] Verdict hold(double t) { return monitor_->hold(t); }
 
+    /// The set of events at which the last step was cut.
     [[nodiscard]] const Cut<State>& cut() const
     {
         if constexpr (same) {

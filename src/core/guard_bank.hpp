@@ -267,7 +267,7 @@ public:
         return true;
     }
 
-    /// Calls `visit(i)`, in ascending order, for the guards that have to be armed anew with their
+    /// Calls `visit(i)`, in ascending order, for the guards that have to be armed again with their
     /// samples at the start: all except those at rest that are still on their sides.
     template <class Visit>
     void for_each_to_arm(const Visit& visit)
