@@ -428,6 +428,7 @@ protected:
     void record(Event<X>&& event)
     {
         if (!options_.record_events) return;
+        if (setup_.add_event) return setup_.add_event(setup_.events, event);
         if (run_.events.empty()) run_.events.reserve(16);  // most runs have no more events
         run_.events.push_back(std::move(event));
     }

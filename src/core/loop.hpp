@@ -494,7 +494,11 @@ private:
     }
 
     /// Samples of the current step before the time `end` of its offset s, as events record it.
-    void emit_samples(double s, double end);
+    void emit_samples(double s, double end)
+    {
+        if (next_sample_ < options_.sample_times.size()) emit_more_samples(s, end);
+    }
+    [[gnu::noinline]] void emit_more_samples(double s, double end);
 
     /// Samples of a state that stays constant, before the time `until`.
     void emit_held_samples(double until);

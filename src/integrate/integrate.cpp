@@ -125,11 +125,15 @@ void throw_start_guard_not_finite(std::string_view who, std::size_t which, std::
 
 template void update(Run<std::array<double, 1>>&, const Run<SmallState>&,
                      const std::array<double, 1>&);
+template void add_event<std::array<double, 1>>(void*, const Event<SmallState>&);
 template void update(Run<std::array<double, 2>>&, const Run<SmallState>&,
                      const std::array<double, 2>&);
+template void add_event<std::array<double, 2>>(void*, const Event<SmallState>&);
 template void update(Run<std::array<double, 3>>&, const Run<SmallState>&,
                      const std::array<double, 3>&);
+template void add_event<std::array<double, 3>>(void*, const Event<SmallState>&);
 template void update(Run<std::array<double, 4>>&, const Run<SmallState>&,
                      const std::array<double, 4>&);
+template void add_event<std::array<double, 4>>(void*, const Event<SmallState>&);
 
 }  // namespace ricochet::detail

@@ -33,6 +33,11 @@ struct RunSetup {
     const void* detecting = nullptr;
     LocatorTable locator;
     const void* locating = nullptr;
+
+    /// Adds an event to the records of the caller, in states of its own type; null: the loop keeps
+    /// them.
+    void (*add_event)(void* events, const Event<X>& event) = nullptr;
+    void* events = nullptr;
 };
 
 /// A run in progress; see `Simulation`.

@@ -43,8 +43,7 @@ requires Flowing<System, X> && StateVector<X>
                   "which hands it over");
     detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
                                                                      locator);
-    return detail::as_callers<X>(detail::run_whole(parts.setup(), detail::core_state(x0), options),
-                                 x0);
+    return detail::run_for_caller(parts.setup(), x0, options);
 }
 
 /// A system without a flow for such a state.

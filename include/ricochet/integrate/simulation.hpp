@@ -18,6 +18,7 @@
 #include <memory>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/declarations.hpp"
@@ -185,15 +186,22 @@ void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
     }
 }
 
+template <class X>
+void add_event(void* events, const Event<CoreState<X>>& event);
+
 // Compiled in the library.
 extern template void update(Run<std::array<double, 1>>&, const Run<SmallState>&,
                             const std::array<double, 1>&);
+extern template void add_event<std::array<double, 1>>(void*, const Event<SmallState>&);
 extern template void update(Run<std::array<double, 2>>&, const Run<SmallState>&,
                             const std::array<double, 2>&);
+extern template void add_event<std::array<double, 2>>(void*, const Event<SmallState>&);
 extern template void update(Run<std::array<double, 3>>&, const Run<SmallState>&,
                             const std::array<double, 3>&);
+extern template void add_event<std::array<double, 3>>(void*, const Event<SmallState>&);
 extern template void update(Run<std::array<double, 4>>&, const Run<SmallState>&,
                             const std::array<double, 4>&);
+extern template void add_event<std::array<double, 4>>(void*, const Event<SmallState>&);
 
 /// A run with states of the caller's type.
 template <class X>
@@ -205,6 +213,31 @@ template <class X>
         Run<X> out;
         update(out, run, like);
         return out;
+    }
+}
+
+/// Adds an event to a vector of those of the caller's type, an array.
+template <class X>
+void add_event(void* events, const Event<CoreState<X>>& event)
+{
+    auto& all = *static_cast<std::vector<Event<X>>*>(events);
+    if (all.empty()) all.reserve(16);  // most runs have no more events
+    all.push_back(as_callers(event, X{}));
+}
+
+/// The whole run of a set-up.
+template <class X>
+[[nodiscard]] Run<X> run_for_caller(RunSetup<CoreState<X>> setup, const X& x0,
+                                    const Options& options)
+{
+    if constexpr (std::is_same_v<CoreState<X>, SmallState> && is_array<X>) {
+        Run<X> out;
+        setup.add_event = &add_event<X>;
+        setup.events = &out.events;
+        update(out, run_whole(setup, core_state(x0), options), x0);
+        return out;
+    } else {
+        return as_callers<X>(run_whole(setup, core_state(x0), options), x0);
     }
 }
 
