@@ -416,7 +416,8 @@ private:
         const double tolerance = std::max(resolution_.tolerance(probe.step().time(finding.hi.s)),
                                           bank.unresolved(i, probe.step().h()));
         if (!bank[i].info.boolean) {
-            if (bank.is_cubic(i, probe.step().h())) probe.take_as_cubic();
+            const double departure = bank.departure(i, probe.step().h());
+            if (bank.is_cubic(i, departure)) probe.take_as_cubic();
             return finders_->locate(probe, finding.lo, finding.hi, tolerance);
         }
         // A boolean guard always jumps.
@@ -477,12 +478,13 @@ private:
     }
 
     /// Whether guard i leaves its side once in the step, as plainly as its samples can show.
-    [[nodiscard, gnu::always_inline]] bool goes_plainly(const Bank& bank, std::size_t i,
-                                                        double h) const
+    /// @param e  `GuardBank::departure`
+    [[nodiscard, gnu::always_inline]] bool goes_plainly(const Bank& bank, std::size_t i, double h,
+                                                        double e) const
     {
         const Side side = bank[i].side;
         return bank[i].from == 0 && !bank[i].info.boolean && counts(side, bank[i].info.crossing) &&
-               bank.is_plain(i, h) &&
+               bank.is_plain(i, h, e) &&
                finders_->leaves_plainly(sign_of(side), bank.start(i), bank.end(i, h),
                                         bank.touch(i, h));
     }
@@ -499,7 +501,7 @@ private:
     /// Adds a hit of an acting guard, and its touches before it.
     void examine(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
-        if (goes_plainly(bank, i, step.h())) {
+        if (goes_plainly(bank, i, step.h(), bank.departure(i, step.h()))) {
             return add_hit(i, Finding::leaving(bank[i].side, bank.start(i), bank.end(i, step.h())));
         }
         const auto guard = bank.view(i, step.mode(), calls);
@@ -564,9 +566,10 @@ private:
         Probe probe(guard, step, space_);
         const Side side = bank[i].side;
         const GuardSample start = bank.start(i), end = bank.end(i, step.h());
-        if (goes_plainly(bank, i, step.h())) {
+        const double departure = bank.departure(i, step.h());
+        if (goes_plainly(bank, i, step.h(), departure)) {
             probe.watch(side);
-            if (bank.is_cubic(i, step.h())) probe.take_as_cubic();
+            if (bank.is_cubic(i, departure)) probe.take_as_cubic();
             const double tolerance =
                 std::max(resolution_.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
             const Location where = finders_->locate(probe, start, end, tolerance);

@@ -5,7 +5,6 @@
 // are screened in one loop.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -171,12 +170,18 @@ public:
     /// if the first agreed with the cubic to nine digits, which is no coincidence.
     [[nodiscard]] bool needs_second_check(double h) const noexcept
     {
-        const auto needs = [this, h](std::size_t i) {
+        const auto needs = [ this, h ](std::size_t i) __attribute__((always_inline))
+        {
             const CubicCheck look = cubic(i, h);
             const double e = deviation(look, i, h, CubicCheck::inside, inside_[i]);
             return sign_[i] != 0 && !(0x1p30 * e <= look.size());
         };
-        if (marked_) return std::any_of(marks_.begin(), marks_.end(), needs);
+        if (!are_few() && marked_) {
+            for (const std::size_t i : marks_) {
+                if (needs(i)) return true;
+            }
+            return false;
+        }
         for (std::size_t i = 0; i < size(); ++i) {
             if (needs(i)) return true;
         }
@@ -205,20 +210,24 @@ public:
     }
 
     /// Whether guard i agrees in the step with the cubic through its ends, as far as it has
-    /// been evaluated.
-    [[nodiscard]] bool is_plain(std::size_t i, double h) const noexcept
+    /// been evaluated. @param e  its `departure`
+    [[nodiscard, gnu::always_inline]] bool is_plain(std::size_t i, double h,
+                                                    double e) const noexcept
     {
         if (has_series(i)) return false;
-        if (!checked()) return true;
-        const CubicCheck look = cubic(i, h);
-        return 0x1p16 * deviation(look, i, h) <= look.size();
+        return !checked() || 0x1p16 * e <= cubic(i, h).size();
     }
 
-    /// Whether guard i differs in the step from the cubic through its ends by so little that their
-    /// roots lie within a millionth of the step, as far as it has been evaluated.
-    [[nodiscard]] bool is_cubic(std::size_t i, double h) const noexcept
+    /// Largest deviation found of guard i in the step from the cubic through its ends; infinite if
+    /// none has been sought.
+    [[nodiscard, gnu::always_inline]] double departure(std::size_t i, double h) const noexcept
     {
-        return checked() && 0x1p20 * deviation(cubic(i, h), i, h) <= std::fabs(g1_[i] - g0_[i]);
+        return checked() ? deviation(cubic(i, h), i, h) : std::numeric_limits<double>::infinity();
+    }
+    /// Whether such a deviation moves a root of guard i by less than a millionth of the step.
+    [[nodiscard, gnu::always_inline]] bool is_cubic(std::size_t i, double e) const noexcept
+    {
+        return 0x1p20 * e <= std::fabs(g1_[i] - g0_[i]);
     }
 
     /// Whether the guards have been evaluated inside the step.

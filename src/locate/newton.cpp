@@ -69,8 +69,8 @@ public:
     Search(GuardPath& path, const detail::Bracket& bracket, double tolerance)
         : path_(path), bracket_(bracket), tolerance_(tolerance), end_(bracket.hi.s)
     {
-        path_.complete(bracket_.lo);
-        path_.complete(bracket_.hi);
+        if (std::isnan(bracket_.lo.rate)) path_.complete(bracket_.lo);
+        if (std::isnan(bracket_.hi.rate)) path_.complete(bracket_.hi);
         size_ = detail::larger(detail::larger(0, bracket_.lo.value), bracket_.hi.value);
         scale_ = {.size = size_of(bracket_.lo, bracket_.hi), .h = bracket_.width()};
         curvature_ = bend(bracket_.lo, bracket_.hi);
@@ -104,7 +104,7 @@ private:
     [[nodiscard]] bool ends_straight(const GuardSample& sample, double correction, Location& where);
     [[nodiscard]] bool close_in(const GuardSample& sample, double s, double& noise);
     void halve_along(const GuardSample& sample);
-    [[nodiscard]] double first_place();
+    [[nodiscard]] double refined(double s, double u);
     [[nodiscard]] Location located(const TwoSum& root);
     void mark_jump(Location& where);
     [[nodiscard]] Location hidden(double rate, double noise);
@@ -241,17 +241,13 @@ bool Search::ends_straight(const GuardSample& sample, double correction, Locatio
     return noise > 0;
 }
 
-/// Where to sample first: the root of the cubic through the ends, refined by the secant rule on the
-/// step's polynomial where that is free. Its error there is about a part of its last correction
-/// that is as small as the change of the slope.
-double Search::first_place()
+/// The place s, at the part u of the bracket, refined by the secant rule on the step's polynomial.
+/// Its error there is about a part of its last correction that is as small as the change of the
+/// slope.
+[[gnu::noinline]] double Search::refined(double s, double u)
 {
     const auto& [lo, hi] = bracket_;
     const double h = scale_.h;
-    const double u = detail::hermite_root(lo.value, lo.rate * h, hi.value, hi.rate * h,
-                                          path_.side() == Side::above ? 1 : -1);
-    double s = lo.s + h * u;
-    if (!path_.foretells()) return s;
     const double rise = hi.value - lo.value;
     double slope = ((1 - u) * (1 - 3 * u) * lo.rate + u * (3 * u - 2) * hi.rate) +
                    6 * u * (1 - u) * (rise / h);
@@ -271,14 +267,17 @@ double Search::first_place()
 Location Search::run()
 {
     auto& [lo, hi] = bracket_;
-    double s = first_place();
+    const double u = detail::hermite_root(lo.value, lo.rate * scale_.h, hi.value,
+                                          hi.rate * scale_.h, path_.side() == Side::above ? 1 : -1);
+    double s = lo.s + scale_.h * u;
+    if (path_.foretells()) s = refined(s, u);
     double past = 0;
     double last_distance = std::numeric_limits<double>::infinity();
     double last_value = std::numeric_limits<double>::infinity();
     int linear = 0;
     Location where;
-    GuardSample from;  // the last sample, where the state at it is still at hand
-    bool beside = false;
+    double from = std::numeric_limits<double>::quiet_NaN();  // of a state that is still at hand
+    detail::Bracket kept{};
     for (;;) {
         const double width = bracket_.width();
         const double finest = path_.finest(hi.s);
@@ -286,22 +285,30 @@ Location Search::run()
         s = inside(s, finest);
         if (std::isnan(s)) break;
 
-        beside = beside && std::fabs(s - from.s) <= bent_part * scale_.h;
+        const bool beside = std::fabs(s - from) <= bent_part * scale_.h;
+        if (beside) kept = bracket_;
         const GuardSample sample =
             beside ? path_.value_and_rate_beside(from, s) : path_.value_and_rate(s);
         const bool beyond = path_.has_left(sample);
-        curvature_ = std::max({curvature_, bend(lo, sample), bend(sample, hi)});
+        curvature_ = std::max(std::max(curvature_, bend(lo, sample)), bend(sample, hi));
         const GuardSample replaced = beyond ? hi : lo;
         (beyond ? hi : lo) = sample;
         const double correction = -sample.value / sample.rate;
         const double distance = std::fabs(correction);
         if (is_straight(sample, distance, width, finest)) {
             if (ends_straight(sample, correction, where)) return where;
-        } else if (scale_.may_be(sample.value) &&
+        } else if (!beside && scale_.may_be(sample.value) &&
                    std::fabs(last_value) < 16 * std::fabs(sample.value)) {
             const double noise = detail::close_in_noise(
                 path_, sample, {s + correction, sample.value}, scale_, bracket_);
             if (noise > 0) return hidden(sample.rate, noise);
+        }
+        if (beside) {
+            // The step's own map may pass by at the distance of its error: what was found along
+            // the flow only serves to end the search.
+            bracket_ = kept;
+            from = std::numeric_limits<double>::quiet_NaN();
+            continue;
         }
         last_value = sample.value;
         // Repeatedly not halved: a root of higher order, a pole, or no root.
@@ -309,7 +316,7 @@ Location Search::run()
         last_distance = distance;
         if (linear == most_linear || !std::isfinite(correction)) {
             linear = 0;
-            beside = false;
+            from = std::numeric_limits<double>::quiet_NaN();
             size_ = std::max(size_, detail::narrow_by_values(path_, bracket_, replaced, tolerance_,
                                                              1e-3 * width));
             path_.complete(lo);
@@ -319,10 +326,9 @@ Location Search::run()
             continue;
         }
         // Converged from one side: sample the other side.
+        from = s;
         past = distance > finest ? 0 : past > 0 ? 4 * past : finest;
         s += correction + (beyond ? -past : past);
-        from = sample;
-        beside = true;
         // Three samples have not halved the bracket: bisect.
         slow_ = bracket_.width() > width / 2 ? slow_ + 1 : 0;
         if (slow_ == 3) {

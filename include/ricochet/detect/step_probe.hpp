@@ -176,12 +176,12 @@ public:
     {
         return {.s = s, .value = value_along_the_flow(from.s, s), .rate = from.rate};
     }
-    /// The guard and its rate at offset s, so near `from`, which must be the last sample that
-    /// `value_and_rate` or this function took, that Heun's step along the flow is as good as a
-    /// repeat of the step.
-    [[nodiscard]] GuardSample value_and_rate_beside(const GuardSample& from, double s)
+    /// The guard and its rate at offset s, so near `from`, which must be where `value_and_rate` or
+    /// this function took the last sample, that Heun's step along the flow is as good as a repeat
+    /// of the step.
+    [[nodiscard]] GuardSample value_and_rate_beside(double from, double s)
     {
-        return sample(s, point_beside(from.s, s));
+        return sample(s, point_beside(from, s));
     }
     /// Tells the path that the root lies `correction` [s] after the last sample that
     /// `value_and_rate` took, and that the motion is straight until there.
