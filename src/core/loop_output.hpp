@@ -6,7 +6,7 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline void Loop<X, single>::emit_more_samples(double s, double end)
+void Loop<X, single>::emit_more_samples(double s, double end)
 {
     const auto& times = options_.sample_times;
     const auto holds = [&](std::size_t k) {
