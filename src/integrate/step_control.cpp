@@ -18,7 +18,7 @@ namespace {
 
 }  // namespace
 
-constexpr InverseRoots::InverseRoots(int order) : power_(-1.0 / order)
+constexpr InverseRoots::InverseRoots(int order)
 {
     // 2^(-e/n) by steps of one in e, from e = 0.
     constexpr auto one = static_cast<std::size_t>(1023 - lowest);

@@ -31,7 +31,7 @@ public:
         const auto bits = std::bit_cast<std::uint64_t>(x);
         const std::uint64_t row = (bits >> 52) - lowest;
         if (row >= rows) [[unlikely]]
-            return std::pow(x, power_);
+            return x < 1 ? scale_.front() : scale_.back();
         constexpr std::uint64_t mantissa = (std::uint64_t{1} << 52) - 1;
         const double m =
             std::bit_cast<double>((bits & mantissa) | std::bit_cast<std::uint64_t>(1.0));
@@ -39,13 +39,12 @@ public:
     }
 
 private:
-    /// Biased exponents of the table: 2^-58 ... 2^38. Beyond them the factors of the steps are at
-    /// their limits up to `most_order`, whatever the power.
+    /// Biased exponents of the table, 2^-58 ... 2^38. Numbers beyond count as these: up to
+    /// `most_order` the factors of the steps are at their limits there.
     static constexpr std::uint64_t lowest = 1023 - 58, rows = 96;
 
     std::array<double, rows> scale_{};
     std::array<double, 4> c_{};  ///< highest power first
-    double power_ = 0;
 };
 
 /// One for each order; the first is not used.
