@@ -1,3 +1,6 @@
 #include "ricochet/nonsmooth/hand_over.hpp"
 
-RICOCHET_INCLUSIONS_OF(3, 1, )
+RICOCHET_SET_VALUED_OF(3, 1, )
+RICOCHET_HAND_OVER_OF(3, 1, )
+RICOCHET_MODES_OF(3, 1, )
+RICOCHET_EVENTS_OF(3, 1, Dopri5, )

@@ -17,6 +17,7 @@ using Reaction = Eigen::Matrix<double, 1, 1>;
 // CASE 7: found no `smooth` that fits
 // CASE 8: found no `reaction_set` that fits
 // CASE 9: found a system that is no inclusion
+// CASE 10 alone: found an inclusion of more than 8 components or 4 reactions, which the library has not compiled
 struct Block {
 #if CASE != 9
     static constexpr int state_size = 2;
@@ -80,7 +81,19 @@ struct Block {
 #endif
 };
 
+struct Large {
+    static constexpr int state_size = 9;
+    static constexpr int reaction_size = 1;
+    using Vector = Eigen::Matrix<double, 9, 1>;
+    void smooth(double, const Vector& w, Vector& f) const { f = -w; }
+    sets::IntervalSet reaction_set(double, const Vector&) const { return {-0.3, 0.3}; }
+};
+
 void run()
 {
+#if CASE == 10
+    (void)hand_over(Large{}, Large::Vector::Zero(), {.t_end = 1});
+#else
     (void)hand_over(Block{}, State(0, 0), {.t_end = 1});
+#endif
 }

@@ -203,7 +203,7 @@ private:
         X rate;
         modes_.flow(event.mode_after, event.t, event.after, rate);
         const auto i = static_cast<Eigen::Index>(event.guard / 4);
-        return std::abs(modes_.matrices().observe().row(i).dot(Modes::vector(rate)));
+        return std::abs(modes_.rate_of(i, Modes::vector(rate)));
     }
 
     /// Size of y that the tolerances of a step resolve.
@@ -460,7 +460,7 @@ private:
         const Reaction y = modes_.observed(t, w);
         const double size = w.template lpNorm<Eigen::Infinity>();
         const double least = 1e3 * (options_.atol + options_.rtol * size);
-        for (Eigen::Index i = 0; i < y.size(); ++i) {
+        for (Eigen::Index i = 0; i < modes_.count(); ++i) {
             if (branches[i] != Branch::inside && std::abs(y[i]) < least) return false;
         }
         return true;
@@ -559,9 +559,9 @@ private:
 template <int N, int M>
 AnyHandOver<N, M>::AnyHandOver(const AnyInclusion<N, M>& inclusion, const Vector& w0,
                                const HandOverOptions& options, const EventStepping<N, M>& stepping)
-    : options_(completed(options, branches(inclusion.traits))),
+    : options_(completed(options, branches(inclusion.traits()))),
       stepping_(stepping),
-      branching_(branches(inclusion.traits)),
+      branching_(branches(inclusion.traits())),
       modes_(inclusion),
       motion_(inclusion, w0, options_.set_valued),
       sample_(motion_.state())

@@ -18,10 +18,10 @@ void AnyModes<N, M>::rooms(Mode mode, double t, const Vector& w, Motion& motion,
     constexpr double infinity = std::numeric_limits<double>::infinity();
     matrices_.inclusion().branch_state(terms_, mode, t, w, motion);
     const Reaction &r = motion.reaction, &lower = motion.lower, &upper = motion.upper;
+    rooms.fill(infinity);
     Mode rest = mode;
-    for (Eigen::Index i = 0; i < M; ++i, rest /= 3) {
+    for (Eigen::Index i = 0; i < count(); ++i, rest /= 3) {
         const auto k = static_cast<std::size_t>(i);
-        rooms[2 * k] = rooms[2 * k + 1] = infinity;
         if (rest % 3 != 1) continue;
         if (!std::isinf(lower[i])) rooms[2 * k] = r[i] - lower[i];
         if (!std::isinf(upper[i])) rooms[2 * k + 1] = upper[i] - r[i];
@@ -54,7 +54,8 @@ void AnyModes<N, M>::guards(Mode mode, double t, const State& x, std::span<doubl
     const Motion here = bounded_motion(mode < branch_modes ? mode : 0, t, w);
     Reaction lower = here.lower, upper = here.upper;
     if (matrices_.traits().continues_bounds) matrices_.inclusion().bounds(t, w, lower, upper);
-    for (Eigen::Index i = 0; i < M; ++i) {
+    if (count() < M) std::fill(g.begin(), g.end(), 1.0);
+    for (Eigen::Index i = 0; i < count(); ++i) {
         const auto k = static_cast<std::size_t>(i);
         const Slacks slack = slacks(here.lower[i], here.upper[i], here.reaction[i]);
         g[4 * k] = y[i];
@@ -86,7 +87,7 @@ void AnyModes<N, M>::guard_rates(Mode mode, double t, const State& x, const Stat
     if (mode >= branch_modes) return;
     const Vector w = vector(x);
     const Vector dwdt = vector(dxdt);
-    for (Eigen::Index i = 0; i < M; ++i) {
+    for (Eigen::Index i = 0; i < count(); ++i) {
         const auto k = static_cast<std::size_t>(i);
         if (is_held(i, mode)) {
             const Slacks of = slack_rates(i, mode, t, w, dwdt);

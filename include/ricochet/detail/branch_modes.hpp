@@ -78,6 +78,8 @@ public:
     explicit AnyModes(const AnyInclusion<N, M>& inclusion);
 
     [[nodiscard]] const Matrices& matrices() const noexcept { return matrices_; }
+    /// Number of reactions of the system.
+    [[nodiscard]] Eigen::Index count() const noexcept { return matrices_.own_reactions(); }
 
     // --- modes and guards by name ---
 
@@ -123,11 +125,13 @@ public:
         info.unilateral = which < first_set_guard && which % 4 < 2;
         return info;
     }
-    [[nodiscard]] static constexpr bool enabled(std::size_t which, Mode mode) noexcept
+    [[nodiscard]] bool enabled(std::size_t which, Mode mode) const noexcept
     {
         if (mode >= branch_modes) return false;
+        const std::size_t i = which >= first_set_guard ? which - first_set_guard : which / 4;
+        if (i >= static_cast<std::size_t>(count())) return false;
         if (which >= first_set_guard) return true;
-        const Branch at = branch(which / 4, mode);
+        const Branch at = branch(i, mode);
         if (which % 4 == 0) return at == Branch::lower;
         if (which % 4 == 1) return at == Branch::upper;
         return at == Branch::inside;
@@ -141,7 +145,7 @@ public:
             for_each_component(dxdt, [&](auto i) { dxdt[i] = 0; });
             return;
         }
-        typename Inclusion::Flow{flow_, matrices_.inclusion(), terms_}(mode, t, x, dxdt);
+        typename Inclusion::Flow{flow_, matrices_.inclusion().system(), terms_}(mode, t, x, dxdt);
     }
 
     /// Reactions and rates in a mode at (t, w).
@@ -157,7 +161,7 @@ public:
     /// Change of the held reactions that the rounding of the terms may cause.
     [[nodiscard]] double rounding_of_held(Mode mode, const Vector& rate, const Reaction& r) const
     {
-        const double free = (rate - terms_.lever.lazyProduct(r)).template lpNorm<Eigen::Infinity>();
+        const double free = (rate - times(terms_.lever, r)).template lpNorm<Eigen::Infinity>();
         return negligible *
                (terms_.holds[mask_of(mode)].largest * free + r.template lpNorm<Eigen::Infinity>());
     }
@@ -198,13 +202,15 @@ public:
     [[nodiscard]] Reaction observed(double t, const Vector& w) const
     {
         Reaction y;
-        if constexpr (BranchTerms<N, M>::in_order) {
-            y[0] = terms_.observed(0, w);
-        } else {
-            y = matrices_.observe().lazyProduct(w);
-        }
+        for (Eigen::Index i = 0; i < M; ++i) y[i] = terms_.observed(i, w);
         if (moves()) y -= offset(t);
         return y;
+    }
+
+    /// Row i of E times a vector.
+    [[nodiscard]] double rate_of(Eigen::Index i, const Vector& v) const
+    {
+        return terms_.observed(i, v);
     }
 
     /// The first reaction whose bounds form no interval; -1 if all do.
@@ -224,7 +230,6 @@ public:
     }
 
 private:
-    static constexpr std::size_t masks = std::size_t{1} << M;
     [[nodiscard]] bool moves() const noexcept { return matrices_.traits().moves; }
 
     void prepare(std::size_t mask)
@@ -340,7 +345,7 @@ private:
         if (moves()) rate -= offset_rate(t)[i];
         double size = 0;
         Mode rest = mode;
-        for (Eigen::Index j = 0; j < M; ++j, rest /= 3) {
+        for (Eigen::Index j = 0; j < count(); ++j, rest /= 3) {
             if (terms_.delassus(i, j) == 0 || rest % 3 == 1) continue;
             const auto at = static_cast<Branch>(static_cast<int>(rest % 3) - 1);
             size += std::abs(terms_.delassus(i, j) * bound(t, w, j, at));
@@ -380,8 +385,9 @@ private:
         Vector f;
         matrices_.smooth(t, w, f);
         LinearInequality<M> inequality;
+        inequality.unknowns = count();
         inequality.w = terms_.delassus;
-        inequality.y0.noalias() = matrices_.observe() * (matrices_.inverse_mass() * f);
+        inequality.y0.noalias() = times(terms_.observe, times(terms_.inverse_mass, f));
         if (moves()) inequality.y0 -= offset_rate(t);
         matrices_.inclusion().branch_bounds(t, w, inequality.lower, inequality.upper);
         for (Eigen::Index i = 0; i < M; ++i) {
@@ -404,7 +410,7 @@ private:
             }
             if (terms_.delassus(i, i) == 0 && rate[i] == 0) return no_flow;
             const double terms =
-                std::abs(inequality.y0[i]) + terms_.delassus.row(i).cwiseAbs().dot(r.cwiseAbs());
+                inequality.terms(i, r);
             const double room = std::min(r[i] - inequality.lower[i], inequality.upper[i] - r[i]);
             const bool clear = next[i] == Branch::inside ? room > negligible * std::abs(r[i])
                                                          : std::abs(rate[i]) > negligible * terms;
@@ -437,7 +443,7 @@ private:
         const auto rate_of_y = [&](double s) {
             Eigen::Map<Vector>(x.data()) = w + s * rate;
             flow(leaving, t + s, x, dxdt);
-            double y = matrices_.observe().row(i) * vector(dxdt);
+            double y = terms_.observed(i, vector(dxdt));
             if (moves()) y -= offset_rate(t + s)[i];
             return y;
         };
@@ -464,10 +470,10 @@ AnyModes<N, M>::AnyModes(const AnyInclusion<N, M>& inclusion) : matrices_(inclus
     terms_.inverse_diagonal = terms_.inverse_mass.diagonal();
     terms_.diagonal = terms_.inverse_mass.isDiagonal(0);
     flow_ = inclusion.branch_flow(terms_.diagonal);
-    terms_.lever = matrices_.inverse_mass() * matrices_.act();
-    terms_.delassus = matrices_.observe() * terms_.lever;
+    terms_.lever = times(matrices_.inverse_mass(), matrices_.act());
+    terms_.delassus = times(matrices_.observe(), terms_.lever);
     for (Eigen::Index i = 0; i < M; ++i) terms_.selected[i] = matrices_.selected(i);
-    for (std::size_t mask = 0; mask < masks; ++mask) prepare(mask);
+    for (std::size_t mask = 0; mask >> count() == 0; ++mask) prepare(mask);
 }
 
 template <int N, int M>
@@ -500,7 +506,7 @@ template <int N, int M>
 auto AnyModes<N, M>::zero_branches(double t, const Vector& w) const -> Branches
 {
     const Reaction y = observed(t, w);
-    const Reaction size = matrices_.observe().cwiseAbs() * w.cwiseAbs() + offset(t).cwiseAbs();
+    const Reaction size = times(matrices_.observe().cwiseAbs(), w.cwiseAbs()) + offset(t).cwiseAbs();
     Branches out;
     for (Eigen::Index i = 0; i < M; ++i) {
         const double rounding = 16 * std::numeric_limits<double>::epsilon() * size[i];
@@ -520,7 +526,7 @@ void AnyModes<N, M>::hold(const Branches& branches, double t, Vector& w) const
         if (branches[i] != Branch::inside) y[i] = 0;
         any = any || (branches[i] == Branch::inside && matrices_.selected(i) < 0);
     }
-    if (any && mine.determined) w -= terms_.lever * (mine.inverse * y);
+    if (any && mine.determined) w -= times(terms_.lever, times(mine.inverse, y));
     const Reaction s = offset(t);
     for (Eigen::Index i = 0; i < M; ++i) {
         if (branches[i] == Branch::inside) matrices_.hold(i, 0, s[i], w);
@@ -542,7 +548,7 @@ template <Branching System>
 class BranchModes : public detail::AnyModes<state_size<System>, reaction_size<System>> {
 public:
     explicit BranchModes(const System& system)
-        : BranchModes::AnyModes(detail::TypedInclusion<System>(system))
+        : BranchModes::AnyModes(detail::exact_inclusion(system))
     {
     }
 };

@@ -10,8 +10,8 @@
 //
 //     r_held = -D^-1 (E A^-1 (f + G r_known) - s'),    D = E A^-1 G of the held reactions,
 //
-// with constant matrices. They are plain data, filled once, by `AnyModes`; `TypedInclusion`,
-// which knows f and the bounds, evaluates the modes from them.
+// with constant matrices. They are plain data, filled once, by `AnyModes`; the table of a system
+// (typed_inclusion.hpp), which knows f and the bounds, evaluates the modes from them.
 #pragma once
 
 #include <algorithm>
@@ -55,21 +55,13 @@ struct RICOCHET_ALIGNED BranchTerms {
     Observation observe;                          ///< E
     Eigen::Matrix<double, N, N> inverse_mass;     ///< A^-1
 
-    /// Whether Eigen adds the products of a row of E in their order. Then a loop over components
-    /// gives the same bits, and reads the components one at a time, as they were written.
-    static constexpr bool in_order = M == 1 && N <= 3;
-
-    /// Row i of E times v.
+    /// Row i of E times v, by a loop that reads the components one at a time, as they were written.
     template <class Vector>
     [[nodiscard, gnu::always_inline]] double observed(Eigen::Index i, const Vector& v) const
     {
-        if constexpr (in_order) {
-            double sum = observe(0, 0) * v[0];
-            for (Eigen::Index k = 1; k < N; ++k) sum += observe(0, k) * v[k];
-            return sum;
-        } else {
-            return observe.row(i) * v;
-        }
+        double sum = observe(i, 0) * v[0];
+        for (Eigen::Index k = 1; k < Vector::SizeAtCompileTime; ++k) sum += observe(i, k) * v[k];
+        return sum;
     }
 };
 
@@ -81,23 +73,23 @@ __extension__ using FirstRates = __complex__ double;
 /// `more`. Every stage of a Runge-Kutta step depends on the flow of the stage before, and passing
 /// the state through memory lengthens this chain: with three components the run of the diode
 /// circuit takes 72 us through memory, and 59 us with components in registers.
-template <class Inclusion, class Terms, class Components>
+template <class Terms, class Components>
 struct BranchFlow;
 
-template <class Inclusion, class Terms, std::size_t... I>
-struct BranchFlow<Inclusion, Terms, std::index_sequence<I...>> {
+template <class Terms, std::size_t... I>
+struct BranchFlow<Terms, std::index_sequence<I...>> {
     template <std::size_t>
     using Component = double;
-    using Function = FirstRates (*)(const Inclusion& inclusion, const Terms& terms, Mode mode,
-                                    double t, Component<I>... x, double* more);
+    using Function = FirstRates (*)(const void* system, const Terms& terms, Mode mode, double t,
+                                    Component<I>... x, double* more);
 
     template <class Typed, bool diagonal>
-    static FirstRates call(const Inclusion& inclusion, const Terms& terms, Mode mode, double t,
+    static FirstRates call(const void* system, const Terms& terms, Mode mode, double t,
                            Component<I>... x, [[maybe_unused]] double* more)
     {
-        typename Inclusion::State w, rate;
+        Eigen::Matrix<double, sizeof...(I), 1> w, rate;
         ((w[I] = x), ...);
-        static_cast<const Typed&>(inclusion).template flow<diagonal>(terms, mode, t, w, rate);
+        Typed::template flow<diagonal>(system, terms, mode, t, w, rate);
         ((I < 2 ? void() : void(more[I - 2] = rate[I])), ...);
         FirstRates two = rate[0];
         if constexpr (sizeof...(I) > 1) __imag__ two = rate[1];
@@ -105,7 +97,7 @@ struct BranchFlow<Inclusion, Terms, std::index_sequence<I...>> {
     }
 
     Function function;
-    const Inclusion& inclusion;
+    const void* system;
     const Terms& terms;
 
     /// Calls the function at (t, x).
@@ -113,7 +105,7 @@ struct BranchFlow<Inclusion, Terms, std::index_sequence<I...>> {
     [[gnu::always_inline]] void operator()(Mode mode, double t, const X& x, X& rate) const
     {
         std::array<double, std::max<std::size_t>(sizeof...(I), 3) - 2> more;
-        const FirstRates two = function(inclusion, terms, mode, t, x[I]..., more.data());
+        const FirstRates two = function(system, terms, mode, t, x[I]..., more.data());
         ((rate[I] = I == 0 ? __real__ two : I == 1 ? __imag__ two : more[I < 2 ? 0 : I - 2]), ...);
     }
 };

@@ -8,6 +8,7 @@
 #include "ricochet/detail/stage_cases.hpp"
 #include "ricochet/detail/stage_fixed_point.hpp"
 #include "ricochet/detail/stage_newton.hpp"
+#include "ricochet/detail/typed_inclusion.hpp"
 
 namespace ricochet {
 
@@ -121,7 +122,7 @@ private:
         stage_.t = from.t + h;
         stage_.c = 3 / h;
         stage_.kappa = stage_.sigma = 1;
-        stage_.q.noalias() = matrices_.mass() * (4 * middle_.w - from.w);
+        stage_.q.noalias() = times(matrices_.mass(), Vector(4 * middle_.w - from.w));
         stage_.q /= h;
         to.t = stage_.t;
         to.w = middle_.w;
@@ -167,9 +168,9 @@ private:
         stage_.c = c;
         stage_.kappa = theta;
         stage_.sigma = averages ? theta : 1;
-        stage_.q.noalias() = c * (matrices_.mass() * from.w);
+        stage_.q.noalias() = c * times(matrices_.mass(), from.w);
         stage_.q += (1 - theta) * f_;
-        if (averages) stage_.q.noalias() += (1 - theta) * (matrices_.act() * from.reaction);
+        if (averages) stage_.q.noalias() += (1 - theta) * times(matrices_.act(), from.reaction);
         to.t = stage_.t;
         to.w = from.w;
         to.reaction = from.reaction;
@@ -268,9 +269,9 @@ template <int N, int M>
 void AnyStep<N, M>::embedded_error(const State& from, double h, const State& to,
                                    Vector& error) const
 {
-    error.noalias() = matrices_.act() * from.reaction;
+    error.noalias() = times(matrices_.act(), from.reaction);
     error += f_;
-    error = (0.5 * h) * (matrices_.inverse_mass() * error).eval();
+    error = (0.5 * h) * times(matrices_.inverse_mass(), error).eval();
     error += 0.5 * (to.w - 4 * middle_.w + 3 * from.w);
 }
 
@@ -281,7 +282,8 @@ void AnyStep<N, M>::branches_of(const State& state, Branches& branches)
     matrices_.inclusion().bounds(state.t, state.w, scratch_.lower, scratch_.upper);
     matrices_.observed(state.t, state.w, scratch_.y);
     matrices_.offset(state.t, scratch_.s);
-    scratch_.argument = matrices_.observe().cwiseAbs() * state.w.cwiseAbs() + scratch_.s.cwiseAbs();
+    scratch_.argument = times(matrices_.observe().cwiseAbs(), state.w.cwiseAbs());
+    scratch_.argument += scratch_.s.cwiseAbs();
     for (Eigen::Index i = 0; i < branches.size(); ++i) {
         const double y = scratch_.y[i];
         if (of_reactions && std::abs(y) > 1e-14 * scratch_.argument[i]) {
@@ -306,7 +308,7 @@ double AnyStep<N, M>::slack(const State& state, const Branches& branches, Eigen:
     matrices_.inclusion().bounds(state.t, state.w, inequality.lower, inequality.upper);
     matrices_.observed(state.t, state.w, scratch_.y);
     double least = std::numeric_limits<double>::infinity();
-    for (Eigen::Index i = 0; i < branches.size(); ++i) {
+    for (Eigen::Index i = 0; i < matrices_.own_reactions(); ++i) {
         const double here = inequality.slack(i, branches[i], state.reaction[i], scratch_.y[i]);
         if (here < least) {
             least = here;
@@ -327,7 +329,7 @@ public:
     /// @throws std::invalid_argument for what `SchemeOptions` and `InclusionMatrices` refuse,
     /// and for StageMethod::cases where the set is no box of at most four reactions.
     explicit CompositeStep(const System& system, const SchemeOptions& options = {})
-        : CompositeStep::AnyStep(detail::TypedInclusion<System>(system), options)
+        : CompositeStep::AnyStep(detail::exact_inclusion(system), options)
     {
     }
 };

@@ -56,16 +56,42 @@ struct StageOptions {
 
 namespace detail {
 
+/// Writes the inverse of the first n rows and columns of a, n <= 4, and zeros elsewhere. The formula
+/// is that of n.
+template <int N>
+void invert_first(const Eigen::Matrix<double, N, N>& a, Eigen::Index n,
+                  Eigen::Matrix<double, N, N>& inverse)
+{
+    if (n < N) inverse.setZero();
+    const auto invert = [&]<int k>(std::integral_constant<int, k>) {
+        if constexpr (k <= N) {
+            const Eigen::Matrix<double, k, k> own = a.template topLeftCorner<k, k>();
+            inverse.template topLeftCorner<k, k>() = own.inverse();
+        }
+    };
+    switch (n) {
+        case 1: return invert(std::integral_constant<int, 1>{});
+        case 2: return invert(std::integral_constant<int, 2>{});
+        case 3: return invert(std::integral_constant<int, 3>{});
+        default: return invert(std::integral_constant<int, 4>{});
+    }
+}
+
 /// S^-1 and the matrices that follow from it.
 template <int N, int M>
 struct RICOCHET_ALIGNED StageFactor {
-    static constexpr bool direct = N != Eigen::Dynamic && N <= 4;
+    /// Whether a system of n components has its inverse written out.
+    [[nodiscard]] static constexpr bool is_direct(Eigen::Index n) noexcept
+    {
+        return N != Eigen::Dynamic && n <= 4;
+    }
     using Matrices = AnyMatrices<N, M>;
     using State = typename Matrices::State;
     using Square = typename Matrices::Square;
 
     double c = 0, kappa = 0, sigma = 0;
     bool valid = false;
+    bool direct = false;
     Square jacobian;
     Square inverse;                        // of S, if direct
     Eigen::PartialPivLU<Square> lu;        // of S, if not
@@ -75,24 +101,32 @@ struct RICOCHET_ALIGNED StageFactor {
     void compute(const Matrices& m, const Stage<N, M>& stage)
     {
         c = stage.c, kappa = stage.kappa, sigma = stage.sigma;
-        if constexpr (direct) {
-            inverse = (c * m.mass() - kappa * jacobian).inverse();
-            influence.noalias() = inverse * m.act();
-        } else {
-            lu.compute(c * m.mass() - kappa * jacobian);
-            influence = lu.solve(m.act());
+        direct = is_direct(m.own_size());
+        if constexpr (N != Eigen::Dynamic) {
+            if (direct) {
+                invert_first<N>(c * m.mass() - kappa * jacobian, m.own_size(), inverse);
+                influence.noalias() = times(inverse, m.act());
+            }
+        }
+        if constexpr (!is_direct(N)) {
+            if (!direct) {
+                lu.compute(c * m.mass() - kappa * jacobian);
+                influence = solve_by(lu, m.act());
+            }
         }
         influence *= sigma;
-        delassus.noalias() = m.observe() * influence;
+        delassus.noalias() = times(m.observe(), influence);
         valid = true;
     }
 
     void solve(const State& right, State& w) const
     {
-        if constexpr (direct) {
-            w.noalias() = inverse * right;
+        if constexpr (is_direct(N)) {
+            w.noalias() = times(inverse, right);
+        } else if (direct) {
+            w.noalias() = times(inverse, right);
         } else {
-            w = lu.solve(right);
+            w = solve_by(lu, right);
         }
     }
 };
@@ -116,6 +150,7 @@ struct RICOCHET_ALIGNED StageScratch {
         inequality.w.setZero(k, k);
         for (Reaction* v : {&inequality.y0, &inequality.lower, &inequality.upper}) v->setZero(k);
         inequality.confines = traits.confines;
+        if constexpr (M != Eigen::Dynamic) inequality.unknowns = matrices.own_reactions();
     }
 
     const Matrices& m;
@@ -156,14 +191,16 @@ struct RICOCHET_ALIGNED StageScratch {
             rho[i] = w > 0 ? 1 / w : 1;
             sum += w;
         }
-        if (!traits.box) rho.setConstant(sum > 0 ? static_cast<double>(rho.size()) / sum : 1);
+        if (!traits.box) {
+            rho.setConstant(sum > 0 ? static_cast<double>(m.own_reactions()) / sum : 1);
+        }
     }
 
     /// Argument of the projection in the law of (w, r): reaction - rho y, or for a set of states
     /// y - reaction / rho.
     void law_argument(const State& w, const Reaction& r)
     {
-        y.noalias() = m.observe() * w;
+        y.noalias() = times(m.observe(), w);
         y -= s;
         if (traits.of_reactions()) {
             argument = r - rho.cwiseProduct(y);
@@ -189,12 +226,12 @@ struct RICOCHET_ALIGNED StageScratch {
     StageReport residual(const Stage<N, M>& stage, const State& w, const State& f_at,
                          const Reaction& r)
     {
-        base.noalias() = stage.c * (m.mass() * w);
+        base.noalias() = stage.c * times(m.mass(), w);
         defect = base - stage.kappa * f_at - stage.q;
         double scale = std::max({base.template lpNorm<Eigen::Infinity>(),
                                  stage.kappa * f_at.template lpNorm<Eigen::Infinity>(),
                                  stage.q.template lpNorm<Eigen::Infinity>()});
-        base.noalias() = stage.sigma * (m.act() * r);
+        base.noalias() = stage.sigma * times(m.act(), r);
         defect -= base;
         scale = std::max(scale, base.template lpNorm<Eigen::Infinity>());
         StageReport report{.residual = defect.template lpNorm<Eigen::Infinity>()};

@@ -36,9 +36,9 @@ template <int N, int M>
     const double force = lever > 0 ? f.template lpNorm<Eigen::Infinity>() / lever : 0;
     const double scale = std::max(
         {reaction.template lpNorm<Eigen::Infinity>(), force, std::numeric_limits<double>::min()});
-    f = f.cwiseAbs().eval() + m.act().cwiseAbs() * reaction.cwiseAbs();
-    f = w.cwiseAbs() + span * (m.inverse_mass().cwiseAbs() * f).eval();
-    size = 1e-9 * (m.observe().cwiseAbs() * f + size.cwiseAbs());
+    f = f.cwiseAbs().eval() + detail::times(m.act().cwiseAbs(), reaction.cwiseAbs());
+    f = w.cwiseAbs() + span * detail::times(m.inverse_mass().cwiseAbs(), f).eval();
+    size = 1e-9 * (detail::times(m.observe().cwiseAbs(), f) + size.cwiseAbs());
     double worst = 0;
     if (m.traits().box) {
         Reaction lower = y, upper = y;

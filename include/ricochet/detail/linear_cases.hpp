@@ -17,6 +17,7 @@
 #include <cmath>
 
 #include "ricochet/detail/alignment.hpp"
+#include "ricochet/detail/ordered_products.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
 
 namespace ricochet {
@@ -42,6 +43,9 @@ struct RICOCHET_ALIGNED LinearInequality {
     Matrix w;  ///< W
     Vector y0;
     Vector lower, upper;  ///< of K
+    /// Number of pairs, at most M, where that is fixed. Those behind it have no part in W; they are
+    /// at the lower bound, 0, of a set of reactions, and inside a set of states.
+    Eigen::Index unknowns = M;
 
     /// The first component whose interval is empty or has a bound that is not a number; -1 if
     /// there is none.
@@ -57,8 +61,13 @@ struct RICOCHET_ALIGNED LinearInequality {
     /// and are overwritten. False if none was found.
     [[nodiscard]] bool solve(Vector& reaction, Vector& y, Branches& branches) const
     {
-        if constexpr (M == 1) {
-            if (w(0, 0) > 0) return solve_one(reaction, y, branches);
+        if constexpr (M != Eigen::Dynamic) {
+            for (Eigen::Index i = count(); i < M; ++i) {
+                branches[i] = confines == Confines::reaction ? Branch::lower : Branch::inside;
+                reaction[i] = 0;
+                y[i] = y0[i];
+            }
+            if (count() == 1 && w(0, 0) > 0) return solve_one(reaction, y, branches);
         }
         return search(reaction, y, branches);
     }
@@ -111,7 +120,22 @@ struct RICOCHET_ALIGNED LinearInequality {
         return std::min(confined - lower[i], upper[i] - confined);
     }
 
+    /// Sum of the sizes of the terms of y_i.
+    [[nodiscard]] double terms(Eigen::Index i, const Vector& reaction) const
+    {
+        double sum = 0;
+        for (Eigen::Index j = 0; j < y0.size(); ++j) sum += std::abs(w(i, j)) * std::abs(reaction[j]);
+        return std::abs(y0[i]) + sum;
+    }
+
 private:
+    [[nodiscard]] Eigen::Index count() const noexcept
+    {
+        if constexpr (M == Eigen::Dynamic) return y0.size();
+        if constexpr (M == 1) return 1;
+        return unknowns;
+    }
+
     [[nodiscard]] double fixed_reaction(Eigen::Index i, Branch branch) const
     {
         if (confines == Confines::state) return 0;
@@ -122,12 +146,6 @@ private:
     {
         if (confines == Confines::reaction) return 0;
         return branch == Branch::lower ? lower[i] : upper[i];
-    }
-
-    /// Sum of the sizes of the terms of y_i.
-    [[nodiscard]] double terms(Eigen::Index i, const Vector& reaction) const
-    {
-        return std::abs(y0[i]) + w.row(i).cwiseAbs().dot(reaction.cwiseAbs());
     }
 
     /// Whether pair i is off its branch by more than the rounding of the products.
@@ -180,7 +198,7 @@ private:
     /// Whether all pairs are on their branches up to the rounding of the products.
     [[nodiscard]] bool fits(const Branches& branches, const Vector& reaction, const Vector& y) const
     {
-        for (Eigen::Index i = 0; i < y.size(); ++i) {
+        for (Eigen::Index i = 0; i < count(); ++i) {
             if (leaves(i, branches[i], reaction, y)) return false;
         }
         return true;
@@ -235,7 +253,7 @@ bool LinearInequality<M>::search(Vector& reaction, Vector& y, Branches& branches
 {
     const auto fit = [&] { return solve_on(branches, reaction, y) && fits(branches, reaction, y); };
     if (fit() && determines(branches, reaction)) return true;
-    const int m = static_cast<int>(y0.size());
+    const int m = static_cast<int>(count());
     if (m > most_cases) return solve_by_pivots(reaction, y, branches);
     int count = 1;
     for (int i = 0; i < m; ++i) count *= 3;
@@ -313,7 +331,7 @@ bool LinearInequality<M>::solve_on(const Branches& branches, Vector& reaction, V
         reaction = a.partialPivLu().solve(b);
     }
     if (!reaction.allFinite()) return false;
-    y.noalias() += w * reaction;
+    y.noalias() += detail::times(w, reaction);
     for (Eigen::Index i = 0; i < m; ++i) {
         if (held(branches[i])) y[i] = target(i, branches[i]);
     }

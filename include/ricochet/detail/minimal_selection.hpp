@@ -59,17 +59,17 @@ struct RICOCHET_ALIGNED SelectionProblem {
 
     void residual(const Reaction& r, Reaction& f) const
     {
-        const Reaction z = r - rho * (constant + w * r);
+        const Reaction z = r - rho * (constant + times(w, r));
         inclusion.project(t, state, z, f);
         f = r - f;
     }
     [[nodiscard]] bool direction(const Reaction& r, const Reaction& f, Reaction& d) const
     {
-        const Reaction z = r - rho * (constant + w * r);
+        const Reaction z = r - rho * (constant + times(w, r));
         Matrix slope = w;
         inclusion.derivative(t, state, z, slope.data());
         Matrix v = Matrix::Identity(w.rows(), w.cols()) - slope;
-        v.noalias() += rho * slope * w;
+        v.noalias() += times(Matrix(rho * slope), w);
         Eigen::PartialPivLU<Matrix> lu;
         return dense_direction(v, lu, f, d);
     }
@@ -100,7 +100,7 @@ struct RICOCHET_ALIGNED SelectionStart {
             refuse_inclusion("the set at the start " + fault);
         }
         if (const std::size_t dimension = inclusion.set_dimension(t, w);
-            static_cast<Eigen::Index>(dimension) != m.reactions()) {
+            static_cast<Eigen::Index>(dimension) != m.own_reactions()) {
             refuse_inclusion("the set must have the dimension of the reaction, not",
                              static_cast<double>(dimension));
         }
@@ -110,7 +110,7 @@ struct RICOCHET_ALIGNED SelectionStart {
         Reaction s;
         m.observed(t, w, y);
         m.offset(t, s);
-        rate = m.observe() * (m.inverse_mass() * f);
+        rate = times(m.observe(), times(m.inverse_mass(), f));
         if (m.traits().gives_offset_rate) {
             Reaction declared = Reaction::Zero(m.reactions());
             inclusion.offset_rate(t, declared);
@@ -122,8 +122,8 @@ struct RICOCHET_ALIGNED SelectionStart {
             m.offset(t - step, behind);
             rate -= (ahead - behind) / (2 * step);
         }
-        delassus = m.observe() * (m.inverse_mass() * m.act());
-        size = m.observe().cwiseAbs() * w.cwiseAbs() + s.cwiseAbs();
+        delassus = times(m.observe(), times(m.inverse_mass(), m.act()));
+        size = times(m.observe().cwiseAbs(), w.cwiseAbs()) + s.cwiseAbs();
     }
 
     [[nodiscard]] double rounding(Eigen::Index i) const
@@ -161,6 +161,7 @@ struct RICOCHET_ALIGNED SelectionStart {
         Reaction reaction;
         reaction.setZero(m.reactions());
         LinearInequality<M> inequality;
+        if constexpr (M != Eigen::Dynamic) inequality.unknowns = m.own_reactions();
         inequality.w = delassus;
         inequality.y0 = rate;
         inequality.lower = inequality.upper = reaction;
@@ -193,14 +194,16 @@ struct RICOCHET_ALIGNED SelectionStart {
             std::max(rate.template lpNorm<Eigen::Infinity>(), delassus.cwiseAbs().maxCoeff());
         const double delta = std::isfinite(smallest) && largest > 0 ? 1e-9 * smallest / largest : 1;
         const Reaction constant = y / delta + rate;
-        const double mean = delassus.diagonal().cwiseAbs().mean();
+        double mean = 0;
+        for (Eigen::Index i = 0; i < y.size(); ++i) mean += std::abs(delassus(i, i));
+        mean /= static_cast<double>(m.own_reactions());
         SelectionProblem<N, M> problem{m.inclusion(), t,        w,
                                        delassus,      constant, mean > 0 ? 1 / mean : 1};
         (void)semismooth_newton(problem, reaction, {.tolerance = 1e-13, .max_iterations = 100});
         // Where Newton's method stalls at a kink the fixed point converges, more slowly.
-        const double rho = 1 / std::max(delassus.norm(), std::numeric_limits<double>::min());
+        const double rho = 1 / std::max(norm(delassus), std::numeric_limits<double>::min());
         for (int i = 0; i < 20000; ++i) {
-            Reaction z = reaction - rho * (constant + delassus * reaction);
+            Reaction z = reaction - rho * (constant + times(delassus, reaction));
             m.inclusion().project(t, w, z, z);
             const double moved = (z - reaction).template lpNorm<Eigen::Infinity>();
             reaction = z;

@@ -16,6 +16,8 @@
 #include <cmath>
 #include <concepts>
 
+#include "ricochet/detail/ordered_products.hpp"
+
 namespace ricochet {
 
 template <class Problem, class Vector>
@@ -69,12 +71,12 @@ template <class Vector, NewtonProblem<Vector> Problem>
             return report;
         }
         // Armijo's constant 1e-4; along a Newton direction |F|^2 / 2 has the slope -|F|^2.
-        const double merit = f.squaredNorm();
+        const double merit = detail::squared_norm(f);
         double share = 1;
         for (int halving = 0;; ++halving, share /= 2) {
             trial = x + share * direction;
             problem.residual(trial, f_trial);
-            if (f_trial.squaredNorm() <= (1 - 2e-4 * share) * merit) break;
+            if (detail::squared_norm(f_trial) <= (1 - 2e-4 * share) * merit) break;
             if (!options.line_search && f_trial.allFinite()) break;
             if (halving == options.max_halvings) return report;
         }
@@ -97,7 +99,7 @@ template <class Matrix, class Vector>
                                    const Vector& f, Vector& d)
 {
     lu.compute(v);
-    d = -lu.solve(f);
+    d = -detail::solve_by(lu, f);
     return d.allFinite();
 }
 

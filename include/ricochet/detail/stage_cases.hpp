@@ -42,7 +42,7 @@ public:
             if (!scratch_.inclusion.bounds(stage_.t, w, inequality.lower, inequality.upper)) {
                 return {.iterations = iteration, .set = std::max(0, inequality.faulty())};
             }
-            scratch_.base.noalias() = factor.jacobian * w;
+            scratch_.base.noalias() = times(factor.jacobian, w);
             scratch_.base = stage_.q + stage_.kappa * (scratch_.f - scratch_.base);
             if (!solve_tangent(factor)) return {.iterations = iteration, .set = 0};
 
@@ -81,7 +81,7 @@ private:
     [[nodiscard]] StageReport without_law()
     {
         const double scale = std::max(
-            {(stage_.c * (scratch_.m.mass() * scratch_.trial)).template lpNorm<Eigen::Infinity>(),
+            {(stage_.c * times(scratch_.m.mass(), scratch_.trial)).template lpNorm<Eigen::Infinity>(),
              stage_.q.template lpNorm<Eigen::Infinity>(),
              stage_.kappa * scratch_.f_trial.template lpNorm<Eigen::Infinity>()});
         double worst = scratch_.defect.template lpNorm<Eigen::Infinity>();
@@ -103,7 +103,7 @@ private:
     void smooth_at_trial(const Factor& factor, const State& w)
     {
         if (scratch_.traits.affine) {
-            scratch_.f_trial.noalias() = factor.jacobian * (scratch_.trial - w);
+            scratch_.f_trial.noalias() = times(factor.jacobian, State(scratch_.trial - w));
             scratch_.f_trial += scratch_.f;
         } else {
             scratch_.m.smooth(stage_.t, scratch_.trial, scratch_.f_trial);
@@ -118,12 +118,12 @@ private:
         auto& inequality = scratch_.inequality;
         factor.solve(scratch_.base, scratch_.w0);
         inequality.w = factor.delassus;
-        inequality.y0.noalias() = m.observe() * scratch_.w0;
+        inequality.y0.noalias() = times(m.observe(), scratch_.w0);
         inequality.y0 -= scratch_.s;
         const bool found = frozen_ ? inequality.solve_on(branches_, scratch_.reaction, scratch_.y)
                                    : inequality.solve(scratch_.reaction, scratch_.y, branches_);
         if (!found) return false;
-        scratch_.trial.noalias() = factor.influence * scratch_.reaction;
+        scratch_.trial.noalias() = times(factor.influence, scratch_.reaction);
         scratch_.trial += scratch_.w0;
         for (Eigen::Index i = 0; i < branches_.size(); ++i) {
             if (inequality.held(branches_[i])) {

@@ -30,7 +30,7 @@ template <int N, int M>
     const auto& factor = scratch.factor(stage, w);
     scratch.set_rho(factor);
     double largest = 0;
-    for (Eigen::Index i = 0; i < w.size(); ++i) {
+    for (Eigen::Index i = 0; i < m.own_size(); ++i) {
         largest = std::max(
             largest, std::abs(stage.c * m.mass()(i, i) - stage.kappa * factor.jacobian(i, i)));
     }
@@ -39,7 +39,7 @@ template <int N, int M>
     auto& before = scratch.w0;
     const auto defect = [&](const auto& at, auto& out) {
         m.smooth(stage.t, at, scratch.f);
-        out.noalias() = stage.c * (m.mass() * at);
+        out.noalias() = stage.c * times(m.mass(), at);
         out -= stage.kappa * scratch.f + stage.q;
     };
     defect(w, force);
@@ -49,7 +49,7 @@ template <int N, int M>
         before = w;
         scratch.trial = force;
         w -= rho * force;
-        scratch.argument.noalias() = m.observe() * w;
+        scratch.argument.noalias() = times(m.observe(), w);
         scratch.argument -= scratch.s;
         const bool of_reactions = scratch.traits.of_reactions();
         if (of_reactions) scratch.argument /= -rho * stage.sigma;
@@ -61,15 +61,15 @@ template <int N, int M>
         } else {
             reaction = (scratch.image - scratch.argument) / (rho * stage.sigma);
         }
-        w.noalias() += (rho * stage.sigma) * (m.act() * reaction);
+        w.noalias() += (rho * stage.sigma) * times(m.act(), reaction);
         defect(w, force);
         report = scratch.residual(stage, w, scratch.f, reaction);
         report.iterations = iteration;
         report.converged = report.residual <= options.tolerance;
         if (report.converged || !std::isfinite(report.residual)) return report;
-        const double moved = (w - before).norm();
-        if (moved > 1e-14 + 1e-12 * (1 + w.norm())) {
-            const double ratio = rho * (force - scratch.trial).norm() / moved;
+        const double moved = norm(w - before);
+        if (moved > 1e-14 + 1e-12 * (1 + norm(w))) {
+            const double ratio = rho * norm(force - scratch.trial) / moved;
             if (ratio > 0.9) rho *= 0.66;
             if (ratio < 0.3) rho /= 0.66;
         }

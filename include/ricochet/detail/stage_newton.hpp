@@ -47,7 +47,7 @@ public:
         const auto& factor = scratch.factor(stage, w);
         scratch.set_rho(factor);
         m.smooth(stage.t, w, scratch.f);
-        scale_ = std::max({(stage.c * (m.mass() * w)).template lpNorm<Eigen::Infinity>(),
+        scale_ = std::max({(stage.c * times(m.mass(), w)).template lpNorm<Eigen::Infinity>(),
                            stage.kappa * scratch.f.template lpNorm<Eigen::Infinity>(),
                            stage.q.template lpNorm<Eigen::Infinity>(),
                            std::numeric_limits<double>::min()});

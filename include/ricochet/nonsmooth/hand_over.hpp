@@ -21,6 +21,7 @@
 #include "ricochet/detail/any_hand_over.hpp"
 #include "ricochet/detail/hand_over_run.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
+#include "ricochet/detail/padded_run.hpp"
 #include "ricochet/detail/refused_calls.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
@@ -31,8 +32,9 @@ namespace ricochet {
 template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
 class HandOver {
     static_assert(detail::check_inclusion<System>());
-    static constexpr int N = state_size<System>;
-    static constexpr int M = reaction_size<System>;
+    // Of the solvers.
+    static constexpr int N = detail::solver_components<state_size<System>, reaction_size<System>>;
+    static constexpr int M = detail::solver_reactions<state_size<System>, reaction_size<System>>;
 
 public:
     using Vector = StateOf<System>;
@@ -42,19 +44,22 @@ public:
     /// @throws std::invalid_argument for invalid options, systems and initial
     /// states.
     HandOver(const System& system, const Vector& w0, const HandOverOptions& options)
-        : by_(detail::TypedInclusion<System>(system), w0, options, stepping())
+        : by_(detail::solver_inclusion(system), detail::resized<N>(w0), options, stepping())
     {
     }
 
     /// Starts from the state of an earlier run, with its reaction.
     /// @throws std::invalid_argument also if the reaction lies outside the set.
     HandOver(const System& system, const State& start, const HandOverOptions& options)
-        : by_(detail::TypedInclusion<System>(system), start, options, stepping())
+        : by_(detail::solver_inclusion(system), detail::resized<N, M>(start), options, stepping())
     {
     }
 
     /// Advances to the end and returns the result, whatever the outcome.
-    [[nodiscard]] HandOverRun<System> take() { return {by_.take()}; }
+    [[nodiscard]] HandOverRun<System> take()
+    {
+        return {detail::resized_run<state_size<System>, reaction_size<System>>(by_.take())};
+    }
 
 private:
     [[nodiscard]] static detail::EventStepping<N, M> stepping()

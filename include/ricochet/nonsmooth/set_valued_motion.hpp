@@ -18,6 +18,7 @@
 #include "ricochet/detail/debug_checks.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/minimal_selection.hpp"
+#include "ricochet/detail/padded_motion.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
 
@@ -230,7 +231,7 @@ private:
         }
         if (!std::isfinite(scaled_error_)) report.converged = false;
         if (traits().box && options_.switches == Switches::located && locates_ &&
-            short_switches_ <= 4 + 2 * now_.reaction.size()) {
+            short_switches_ <= 4 + 2 * step_.matrices().own_reactions()) {
             return end_at_switch(h, report);
         }
         return report;
@@ -247,7 +248,7 @@ private:
     [[nodiscard]] StepView view(double h)
     {
         StepView out{.step = h};
-        if (traits().layout != nullptr) {
+        if (inclusion().step_layout() != nullptr) {
             out.tolerance = options_.fields.empty() ? options_.rtol : options_.fields.front().rtol;
             out.step = h / inclusion().step_unit();
             rate_ = (3 * trial_.w - 4 * step_.middle().w + now_.w) / h;
@@ -255,7 +256,7 @@ private:
             if (traits().box) {
                 step_.branches_of(now_, branches_before_);
                 step_.branches_of(trial_, branches_after_);
-                const auto n = branches_before_.size();
+                const Eigen::Index n = step_.matrices().own_reactions();
                 double changed = 0;
                 for (Eigen::Index i = 0; i < n; ++i) {
                     changed += branches_before_[i] != branches_after_[i] ? 1 : 0;
@@ -272,7 +273,7 @@ private:
         double worst = 0;
         for (const ErrorField& field : options_.fields) {
             const auto norm = [&](const Vector& v) {
-                return v.segment(field.first, field.count).norm();
+                return norm_of_segment(v, field.first, field.count);
             };
             const double size = std::max({norm(a), norm(b), field.floor});
             // Nothing moved, and nothing is wrong: zero over zero counts as no error.
@@ -287,12 +288,13 @@ private:
     {
         if (!options_.fields.empty()) return scaled_by_fields(error, a, b);
         double sum = 0;
-        for (Eigen::Index i = 0; i < error.size(); ++i) {
+        const Eigen::Index n = step_.matrices().own_size();
+        for (Eigen::Index i = 0; i < n; ++i) {
             const double size =
                 options_.atol + options_.rtol * std::max(std::abs(a[i]), std::abs(b[i]));
             sum += (error[i] / size) * (error[i] / size);
         }
-        return std::sqrt(sum / static_cast<double>(error.size()));
+        return std::sqrt(sum / static_cast<double>(n));
     }
 
     /// If the step leaves the branches of its start, trial_ becomes the end
@@ -470,8 +472,8 @@ AnyMotion<N, M>::AnyMotion(const AnyInclusion<N, M>& inclusion, const Vector& w0
         refuse_inclusion("the initial state must have as many components as the system, not",
                          static_cast<double>(w0.size()));
     }
-    validate_fields(options.fields, w0.size());
-    validate_policy(options, traits().layout);
+    validate_fields(options.fields, step_.matrices().own_size());
+    validate_policy(options, inclusion.step_layout());
     rate_ = w0;
     branches_before_.setConstant(step_.matrices().reactions(), Branch::inside);
     branches_after_ = branches_before_;
@@ -554,6 +556,13 @@ Outcome AnyMotion<N, M>::advance()
     }
 }
 
+template <class System>
+using MotionOf =
+    std::conditional_t<runs_exactly<System>, AnyMotion<state_size<System>, reaction_size<System>>,
+                       PaddedMotion<state_size<System>, reaction_size<System>,
+                                    solver_components<state_size<System>, reaction_size<System>>,
+                                    solver_reactions<state_size<System>, reaction_size<System>>>>;
+
 }  // namespace detail
 
 /// Motion of a differential inclusion by implicit steps.
@@ -566,14 +575,14 @@ Outcome AnyMotion<N, M>::advance()
 /// with another length. The reaction is part of the state, so that the same (t, w, r) and h give
 /// the same bits.
 template <Inclusion System>
-class SetValuedMotion : public detail::AnyMotion<state_size<System>, reaction_size<System>> {
+class SetValuedMotion : public detail::MotionOf<System> {
 public:
     /// Starts with the minimal selection. Debug builds test the projection of the first set.
     /// @throws std::invalid_argument for invalid options, systems and initial
     /// states.
     SetValuedMotion(const System& system, const StateOf<System>& w0,
                     const SetValuedOptions& options)
-        : SetValuedMotion::AnyMotion(detail::TypedInclusion<System>(system), w0, options)
+        : detail::MotionOf<System>(detail::solver_inclusion(system), w0, options)
     {
     }
 };

@@ -1,3 +1,0 @@
-#include "ricochet/nonsmooth/hand_over.hpp"
-
-RICOCHET_INCLUSIONS_OF(2, 2, )
