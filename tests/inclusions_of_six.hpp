@@ -1,4 +1,5 @@
-// The solvers of the random inclusions of five reactions, which the library has not, are compiled once.
+// The solvers of the random inclusions of five reactions, which the library has not, are compiled
+// once.
 #pragma once
 
 #include "ricochet/nonsmooth/hand_over.hpp"

@@ -105,7 +105,8 @@ void expect_same_steps(const System& system, const StateOf<System>& w0,
 }
 
 /// The ways in which a stage is solved, an error estimated and a change treated.
-[[nodiscard]] inline std::vector<SetValuedOptions> ways(double t_end, double step, bool box, Eigen::Index n)
+[[nodiscard]] inline std::vector<SetValuedOptions> ways(double t_end, double step, bool box,
+                                                        Eigen::Index n)
 {
     const SetValuedOptions plain{.t_end = t_end, .step = step};
     std::vector<SetValuedOptions> all;
@@ -166,7 +167,8 @@ struct Dense {
     void observe(Observation& e) const
     {
         for (Eigen::Index i = 0; i < m; ++i) {
-            for (Eigen::Index j = 0; j < n; ++j) e(i, j) = (i == j ? 1 : 0) + 0.2 * number(i + 7, j);
+            for (Eigen::Index j = 0; j < n; ++j)
+                e(i, j) = (i == j ? 1 : 0) + 0.2 * number(i + 7, j);
         }
     }
     void offset(double t, Reaction& s) const

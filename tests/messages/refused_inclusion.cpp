@@ -17,7 +17,8 @@ using Reaction = Eigen::Matrix<double, 1, 1>;
 // CASE 7: found no `smooth` that fits
 // CASE 8: found no `reaction_set` that fits
 // CASE 9: found a system that is no inclusion
-// CASE 10 alone: found an inclusion of more than 8 components or 4 reactions, which the library has not compiled
+// CASE 10 alone: found an inclusion of more than 8 components or 4 reactions, which the library has
+// not compiled
 struct Block {
 #if CASE != 9
     static constexpr int state_size = 2;

@@ -161,11 +161,13 @@ std::string message_of(const Call& call)
 
 TEST(PaddedInclusions, MessagesCountThoseOfTheSystem)
 {
-    EXPECT_NE(message_of([] { (void)hand_over(Singular{}, Five::start(), {.t_end = 1}); })
-                  .find("rank is 4"),
+    EXPECT_NE(message_of([] {
+                  (void)hand_over(Singular{}, Five::start(), {.t_end = 1});
+              }).find("rank is 4"),
               std::string::npos);
-    EXPECT_NE(message_of([] { (void)hand_over(Misfit{}, Five::start(), {.t_end = 1}); }).find("not 3"),
-              std::string::npos);
+    EXPECT_NE(
+        message_of([] { (void)hand_over(Misfit{}, Five::start(), {.t_end = 1}); }).find("not 3"),
+        std::string::npos);
 }
 
 }  // namespace

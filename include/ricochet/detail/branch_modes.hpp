@@ -409,8 +409,7 @@ private:
                 continue;
             }
             if (terms_.delassus(i, i) == 0 && rate[i] == 0) return no_flow;
-            const double terms =
-                inequality.terms(i, r);
+            const double terms = inequality.terms(i, r);
             const double room = std::min(r[i] - inequality.lower[i], inequality.upper[i] - r[i]);
             const bool clear = next[i] == Branch::inside ? room > negligible * std::abs(r[i])
                                                          : std::abs(rate[i]) > negligible * terms;
@@ -506,7 +505,8 @@ template <int N, int M>
 auto AnyModes<N, M>::zero_branches(double t, const Vector& w) const -> Branches
 {
     const Reaction y = observed(t, w);
-    const Reaction size = times(matrices_.observe().cwiseAbs(), w.cwiseAbs()) + offset(t).cwiseAbs();
+    const Reaction size =
+        times(matrices_.observe().cwiseAbs(), w.cwiseAbs()) + offset(t).cwiseAbs();
     Branches out;
     for (Eigen::Index i = 0; i < M; ++i) {
         const double rounding = 16 * std::numeric_limits<double>::epsilon() * size[i];

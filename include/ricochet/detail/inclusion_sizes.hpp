@@ -52,7 +52,8 @@
     RICOCHET_EVENTS_OF(N, M, Dopri5, how)
 
 /// The same for more than four reactions, which have no modes. (clang 14 would instantiate members
-/// of the hand-over whose constraints these sizes do not satisfy; there each file compiles its own.)
+/// of the hand-over whose constraints these sizes do not satisfy; there each file compiles its
+/// own.)
 #define RICOCHET_INCLUSIONS_WITHOUT_MODES_OF(N, M, how) \
     template <>                                         \
     struct ricochet::detail::CompiledExactly<N, M>;     \
@@ -93,18 +94,24 @@ inline constexpr std::array compiled_sizes{RICOCHET_COMPILED_SIZES(RICOCHET_LIST
 template <int n, int m>
 [[nodiscard]] consteval InclusionSize size_for()
 {
-    constexpr bool exactly = !requires { sizeof(CompiledExactly<n, m>); };
+    constexpr bool exactly = !requires
+    {
+        sizeof(CompiledExactly<n, m>);
+    };
 #if RICOCHET_ALIGNED_AS_LIBRARY
     constexpr bool fixed = n > 0 && m > 0;
     if constexpr (!exactly && fixed) {
         for (const InclusionSize size : compiled_sizes) {
             if (n <= size.components && m <= size.reactions) return size;
         }
-        static_assert(n <= compiled_sizes.back().components && m <= compiled_sizes.back().reactions,
-                      "ricochet: found an inclusion of more than 8 components or 4 reactions, which the "
-                      "library has not compiled; expected RICOCHET_INCLUSIONS_OF(state_size, reaction_size, ) "
-                      "before its first use, RICOCHET_INCLUSIONS_WITHOUT_MODES_OF for more than 4 reactions, or "
-                      "sizes of Eigen::Dynamic");
+        static_assert(
+            n <= compiled_sizes.back().components && m <= compiled_sizes.back().reactions,
+            "ricochet: found an inclusion of more than 8 components or 4 reactions, which the "
+            "library has not compiled; expected RICOCHET_INCLUSIONS_OF(state_size, reaction_size, "
+            ") "
+            "before its first use, RICOCHET_INCLUSIONS_WITHOUT_MODES_OF for more than 4 reactions, "
+            "or "
+            "sizes of Eigen::Dynamic");
     }
 #endif
     return {n, m};

@@ -56,8 +56,8 @@ struct StageOptions {
 
 namespace detail {
 
-/// Writes the inverse of the first n rows and columns of a, n <= 4, and zeros elsewhere. The formula
-/// is that of n.
+/// Writes the inverse of the first n rows and columns of a, n <= 4, and zeros elsewhere. The
+/// formula is that of n.
 template <int N>
 void invert_first(const Eigen::Matrix<double, N, N>& a, Eigen::Index n,
                   Eigen::Matrix<double, N, N>& inverse)

@@ -124,7 +124,8 @@ struct RICOCHET_ALIGNED LinearInequality {
     [[nodiscard]] double terms(Eigen::Index i, const Vector& reaction) const
     {
         double sum = 0;
-        for (Eigen::Index j = 0; j < y0.size(); ++j) sum += std::abs(w(i, j)) * std::abs(reaction[j]);
+        for (Eigen::Index j = 0; j < y0.size(); ++j)
+            sum += std::abs(w(i, j)) * std::abs(reaction[j]);
         return std::abs(y0[i]) + sum;
     }
 

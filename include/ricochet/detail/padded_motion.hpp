@@ -114,10 +114,7 @@ public:
     [[nodiscard]] double next_step() const noexcept { return motion_.next_step(); }
     void next_step(double h) noexcept { motion_.next_step(h); }
     [[nodiscard]] double error() const noexcept { return motion_.error(); }
-    [[nodiscard]] const StepController& controller() const noexcept
-    {
-        return motion_.controller();
-    }
+    [[nodiscard]] const StepController& controller() const noexcept { return motion_.controller(); }
     void locate_switches(bool locate) noexcept { motion_.locate_switches(locate); }
     [[nodiscard]] const Switch& last_switch() const noexcept { return motion_.last_switch(); }
     [[nodiscard]] PaddedStep<n, m, N, M> stepper() noexcept
@@ -150,8 +147,8 @@ public:
     template <class Function>
     [[nodiscard]] std::optional<State> locate(const Function& g, double tolerance = 0)
     {
-        const auto at = motion_.locate(
-            [&](const auto& state) { return g(resized<n, m>(state)); }, tolerance);
+        const auto at =
+            motion_.locate([&](const auto& state) { return g(resized<n, m>(state)); }, tolerance);
         if (!at) return std::nullopt;
         return resized<n, m>(*at);
     }

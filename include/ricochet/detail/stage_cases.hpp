@@ -80,10 +80,11 @@ private:
     /// from an earlier iterate.
     [[nodiscard]] StageReport without_law()
     {
-        const double scale = std::max(
-            {(stage_.c * times(scratch_.m.mass(), scratch_.trial)).template lpNorm<Eigen::Infinity>(),
-             stage_.q.template lpNorm<Eigen::Infinity>(),
-             stage_.kappa * scratch_.f_trial.template lpNorm<Eigen::Infinity>()});
+        const double scale =
+            std::max({(stage_.c * times(scratch_.m.mass(), scratch_.trial))
+                          .template lpNorm<Eigen::Infinity>(),
+                      stage_.q.template lpNorm<Eigen::Infinity>(),
+                      stage_.kappa * scratch_.f_trial.template lpNorm<Eigen::Infinity>()});
         double worst = scratch_.defect.template lpNorm<Eigen::Infinity>();
         if (scratch_.traits.of_reactions()) {
             scratch_.inclusion.bounds(stage_.t, scratch_.trial, scratch_.lower, scratch_.upper);

@@ -471,7 +471,8 @@ template <int N, int M, class System>
 [[nodiscard]] AnyInclusion<N, M> inclusion_of(const System& system)
 {
     Eigen::Index n = state_size<System>, m = reaction_size<System>;
-    if constexpr (state_size<System> == Eigen::Dynamic) n = static_cast<Eigen::Index>(system.size());
+    if constexpr (state_size<System> == Eigen::Dynamic)
+        n = static_cast<Eigen::Index>(system.size());
     if constexpr (reaction_size<System> == Eigen::Dynamic) {
         m = static_cast<Eigen::Index>(system.reactions());
     }
@@ -481,8 +482,9 @@ template <int N, int M, class System>
 /// Whether the solvers of a system have its sizes.
 template <class System>
 inline constexpr bool runs_exactly =
-    solver_components<state_size<System>, reaction_size<System>> == state_size<System>&&
-        solver_reactions<state_size<System>, reaction_size<System>> == reaction_size<System>;
+    solver_components<state_size<System>, reaction_size<System>> ==
+    state_size<System>&& solver_reactions<state_size<System>, reaction_size<System>> ==
+    reaction_size<System>;
 
 /// A copy of a system for the solvers in which it runs.
 template <class System>
