@@ -93,8 +93,8 @@ inline constexpr double straight_part = 3e-8;
 /// Work space for the states of a probe, so that probing allocates nothing.
 template <class X>
 struct ProbeSpace {
-    explicit ProbeSpace(const X& like) : x(like), dxdt(like), root(like), next(like) {}
-    X x, dxdt, root, next;
+    explicit ProbeSpace(const X& like) : x(like), dxdt(like), root(like) {}
+    X x, dxdt, root;
 };
 
 /// Source of the states inside a step.
@@ -400,30 +400,13 @@ private:
     [[nodiscard]] Point point_beside(double from, double s) override
     {
         if (path_ == Path::dense || !follows_flow()) return point_at(s);
-        detail::move(space_->root, space_->x, s - from, space_->dxdt);
-        step_->flow(s, space_->root, space_->next);
-        if (!flows_smoothly(s - from)) return point_at(s);
-        detail::move(space_->x, space_->x, (s - from) / 2, space_->dxdt);
-        detail::move(space_->x, space_->x, (s - from) / 2, space_->next);
-        detail::assign(space_->dxdt, space_->next);
+        const double half = (s - from) / 2;
+        detail::move(space_->x, space_->x, half, space_->dxdt);
+        detail::move(space_->root, space_->x, half, space_->dxdt);
+        step_->flow(s, space_->root, space_->dxdt);
+        detail::move(space_->x, space_->x, half, space_->dxdt);
         placed_ = s;
         return point_of_space(s);
-    }
-
-    /// Whether the flow of the work space changes to the next, `ds` away, by no more than the flow
-    /// changes in the step suggests: the mean of a flow that jumps there would lead astray.
-    [[nodiscard]] bool flows_smoothly(double ds) const
-    {
-        const double part = 64 * std::fabs(ds) / step_->h();
-        const State& rate0 = step_->rate0();
-        const State& rate1 = step_->rate1();
-        bool smooth = true;
-        detail::for_each_component(space_->x, [&](auto i) {
-            const double rate = space_->dxdt[i];
-            const double change = std::fabs(space_->next[i] - rate);
-            smooth &= change <= part * std::fabs(rate1[i] - rate0[i]) + 0x1p-40 * std::fabs(rate);
-        });
-        return smooth;
     }
 
     /// Whether the step's own map follows the flow closely enough for short steps along the flow.
