@@ -28,19 +28,19 @@ TEST(PaddedInclusions, TwoComponents)
 {
     const FrictionInclusion friction;
     const Eigen::Vector2d w0(1, 0.5);
-    compare<2, 1, 3, 1>(friction, w0, 10, 0.05);
-    compare<2, 1, 4, 2>(friction, w0, 10, 0.05);
-    compare<2, 1, 8, 4>(friction, w0, 10, 0.05);
-    compare<2, 1, 4, 2>(Dense<2, 1>{}, Dense<2, 1>::start(), 10, 0.05);
+    compare<2, 1, 3, 1>(friction, w0, 4, 0.05);
+    compare<2, 1, 4, 2>(friction, w0, 4, 0.05);
+    compare<2, 1, 8, 4>(friction, w0, 4, 0.05);
+    compare<2, 1, 4, 2>(Dense<2, 1>{}, Dense<2, 1>::start(), 3, 0.05);
 }
 
 TEST(PaddedInclusions, ThreeComponents)
 {
-    compare<3, 1, 4, 2>(DiodeCircuit{}, DiodeCircuit::start(), 5, 0.01);
-    compare<3, 1, 8, 4>(DiodeCircuit{}, DiodeCircuit::start(), 5, 0.01);
-    compare<3, 1, 8, 4>(Dense<3, 1>{}, Dense<3, 1>::start(), 10, 0.05);
-    compare<3, 1, 4, 2>(DenseInBall<3, 1>{}, Dense<3, 1>::start(), 4, 0.05);
-    compare<3, 1, 8, 4>(DenseWithStops<3, 1>{}, DenseWithStops<3, 1>::start(), 4, 0.05);
+    compare<3, 1, 4, 2>(DiodeCircuit{}, DiodeCircuit::start(), 3, 0.01);
+    compare<3, 1, 8, 4>(DiodeCircuit{}, DiodeCircuit::start(), 3, 0.01);
+    compare<3, 1, 8, 4>(Dense<3, 1>{}, Dense<3, 1>::start(), 3, 0.05);
+    compare<3, 1, 4, 2>(DenseInBall<3, 1>{}, Dense<3, 1>::start(), 2, 0.05);
+    compare<3, 1, 8, 4>(DenseWithStops<3, 1>{}, DenseWithStops<3, 1>::start(), 2, 0.05);
 }
 
 TEST(PaddedInclusions, FixedPoints)
@@ -52,9 +52,9 @@ TEST(PaddedInclusions, FixedPoints)
 
 TEST(PaddedInclusions, FourComponentsAndTwoReactions)
 {
-    compare<4, 2, 8, 4>(Dense<4, 2>{}, Dense<4, 2>::start(), 10, 0.05);
-    compare<4, 2, 8, 4>(DenseInBall<4, 2>{}, Dense<4, 2>::start(), 4, 0.05);
-    compare<4, 2, 8, 4>(DenseWithStops<4, 2>{}, DenseWithStops<4, 2>::start(), 4, 0.05);
+    compare<4, 2, 8, 4>(Dense<4, 2>{}, Dense<4, 2>::start(), 3, 0.05);
+    compare<4, 2, 8, 4>(DenseInBall<4, 2>{}, Dense<4, 2>::start(), 2, 0.05);
+    compare<4, 2, 8, 4>(DenseWithStops<4, 2>{}, DenseWithStops<4, 2>::start(), 2, 0.05);
     compare<4, 2, 8, 4>(InclineBlock(), {1, 1, 0, 0}, 1, 0.01);
 }
 

@@ -11,14 +11,14 @@ using test::DenseInBall;
 
 TEST(PaddedInclusions, TwoReactionsOfTwoComponents)
 {
-    compare<2, 2, 4, 2>(Dense<2, 2>{}, Dense<2, 2>::start(), 10, 0.05);
-    compare<2, 2, 8, 4>(Dense<2, 2>{}, Dense<2, 2>::start(), 10, 0.05);
+    compare<2, 2, 4, 2>(Dense<2, 2>{}, Dense<2, 2>::start(), 3, 0.05);
+    compare<2, 2, 8, 4>(Dense<2, 2>{}, Dense<2, 2>::start(), 3, 0.05);
 }
 
 TEST(PaddedInclusions, ThreeReactionsOfFiveComponents)
 {
-    compare<5, 3, 8, 4>(Dense<5, 3>{}, Dense<5, 3>::start(), 10, 0.05);
-    compare<5, 3, 8, 4>(DenseInBall<5, 3>{}, Dense<5, 3>::start(), 4, 0.05);
+    compare<5, 3, 8, 4>(Dense<5, 3>{}, Dense<5, 3>::start(), 3, 0.05);
+    compare<5, 3, 8, 4>(DenseInBall<5, 3>{}, Dense<5, 3>::start(), 2, 0.05);
 }
 
 }  // namespace
