@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
-"""Every system of the command line with every parameter, and the end of the run, at the ends of
-the range of numbers.
+"""Every system of the command line with every parameter at the ends of the range of numbers.
 
     extreme_parameters.py <ricochet> [system ...]
 
@@ -22,7 +21,6 @@ def runs_of(systems):
         for number in NUMBERS:
             for parameter in system["parameters"]:
                 yield [system["name"], "--set", f"{parameter['name']}={number}"]
-            yield [system["name"], "--t-end", number]
 
 
 def limit_time():

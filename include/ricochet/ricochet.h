@@ -247,8 +247,8 @@ typedef struct rc_options {
     size_t sample_count;        /**< 0 */
     uint64_t max_steps;         /**< UINT64_MAX */
     uint64_t stall_steps; /**< the run ends as RC_STALLED if this many steps in a row, 1000000,
-                             advance the time by less than 1e-9 of the span, or, without an
-                             event, so little that 1000 max_steps would not reach the end;
+                             advance the time by less than 1e-9 of the span, or 20000 without
+                             an event so little that 100 max_steps would not reach the end;
                              0: no limit */
     const char* gate;     /**< path of the model for detectors with a gate, else null */
     const double* component_atol; /**< one for each component in place of atol, copied; null */

@@ -17,8 +17,6 @@ namespace {
 
 /// About a minute: a longer run must be requested.
 constexpr std::uint64_t default_max_steps = 10'000'000;
-/// A tenth of the library's: a run that stands still is told within a second.
-constexpr std::uint64_t stall_steps = 100'000;
 
 template <class Kind, std::size_t n>
 using Names = std::array<std::pair<std::string_view, Kind>, n>;
@@ -294,7 +292,6 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
     options.event_tolerance = request.event_tolerance.value_or(0);
     require_not_negative("--event-tolerance", options.event_tolerance);
     options.max_steps = request.max_steps.value_or(default_max_steps);
-    options.stall_steps = stall_steps;
     options.cancelled = Interrupts::flag();
 
     if (system.choose_integrator != nullptr) {

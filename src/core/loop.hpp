@@ -305,16 +305,34 @@ private:
     /// Whether the limits of the options allow further steps; also sets when to ask next.
     [[gnu::noinline]] bool may_take_more_steps();
 
-    /// Whether the time has hardly advanced since the last review, or, without an event, so little
-    /// that not even a thousand times `max_steps` would reach the end.
+    /// Where the run was at a review, and the number of steps at which the next one is due.
+    struct Review {
+        std::uint64_t due = 0, events = 0;
+        double t = 0;
+    };
+    void renew(Review& review, std::uint64_t stride, bool is_first) noexcept;
+
+    /// Number of steps after which the pace of a run with a limit on its steps is reviewed.
+    [[nodiscard]] std::uint64_t pace_steps() const noexcept
+    {
+        constexpr std::uint64_t most = 20'000;  // under two seconds where a step takes 80 us
+        const bool limited = options_.max_steps < std::numeric_limits<std::uint64_t>::max();
+        return limited ? std::min(options_.stall_steps, most) : 0;
+    }
+
+    /// Whether the time has hardly advanced since a review that is due, or, without an event, so
+    /// little that not even a hundred times `max_steps` would reach the end.
     [[nodiscard]] bool stands_still() const noexcept
     {
+        const Statistics& counts = run_.statistics;
         const double span = std::fabs(options_.t_end - options_.t_start);
-        const double part = static_cast<double>(options_.stall_steps) /
-                            (1e3 * static_cast<double>(options_.max_steps));
-        const bool has_events = run_.statistics.events != reviewed_events_;
-        return std::fabs(step_.until(reviewed_)) <
-               (has_events ? 1e-9 : std::max(1e-9, part)) * span;
+        const auto advances_less = [&](const Review& since, double part) {
+            return counts.steps >= since.due && std::fabs(step_.until(since.t)) < part * span;
+        };
+        const double part =
+            static_cast<double>(pace_steps()) / (1e2 * static_cast<double>(options_.max_steps));
+        return advances_less(stall_review_, 1e-9) ||
+               (counts.events == pace_review_.events && advances_less(pace_review_, part));
     }
 
     /// Ends the run after a failed step.
@@ -530,8 +548,7 @@ private:
     double longest_step_ = 0;        ///< [s] limit on the steps after it
     std::size_t careful_steps_ = 0;  ///< number of steps still to take without looking ahead
     std::uint64_t next_review_ = 0;  ///< number of steps at which to compare with the options
-    double reviewed_ = 0;            ///< [s] time of the last review
-    std::uint64_t reviewed_events_ = 0;
+    Review stall_review_, pace_review_;
     bool is_last_ = false;
     int calm_steps_ = 0;  ///< number of consecutive steps without an event
     std::size_t next_sample_ = 0;

@@ -82,18 +82,27 @@ inline void Loop<X, single>::advance_from_here(const Advance& how)
 template <class X, bool single>
 bool Loop<X, single>::may_take_more_steps()
 {
-    const std::uint64_t steps = run_.statistics.steps;
-    if (steps >= options_.max_steps) {
+    const bool is_first = next_review_ == 0;
+    if (run_.statistics.steps >= options_.max_steps) {
         end(Outcome::step_limit);
-    } else if (next_review_ > 0 && !is_tentative() && stands_still()) {
+    } else if (!is_first && !is_tentative() && stands_still()) {
         end(Outcome::stalled);
     }
-    reviewed_ = step_.start().value;
-    reviewed_events_ = run_.statistics.events;
-    const std::uint64_t stride = options_.stall_steps;
-    next_review_ =
-        stride > 0 && options_.max_steps - steps > stride ? steps + stride : options_.max_steps;
+    renew(stall_review_, options_.stall_steps, is_first);
+    renew(pace_review_, pace_steps(), is_first);
+    next_review_ = std::min(stall_review_.due, pace_review_.due);
     return !ended_;
+}
+
+template <class X, bool single>
+void Loop<X, single>::renew(Review& review, std::uint64_t stride, bool is_first) noexcept
+{
+    const Statistics& counts = run_.statistics;
+    if (!is_first && counts.steps < review.due) return;
+    const bool fits = stride > 0 && options_.max_steps - counts.steps > stride;
+    review = {.due = fits ? counts.steps + stride : options_.max_steps,
+              .events = counts.events,
+              .t = step_.start().value};
 }
 
 template <class X, bool single>

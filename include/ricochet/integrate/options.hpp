@@ -60,9 +60,9 @@ struct Options {
     std::uint64_t max_steps = std::numeric_limits<std::uint64_t>::max();
 
     /// Number of consecutive steps that together have to advance the time by 1e-9 of the span from
-    /// t_start to t_end; else the run ends as `Outcome::stalled`. Without an event among them they
-    /// also have to advance at a pace at which a thousand times `max_steps` would reach t_end. 0:
-    /// no limit.
+    /// t_start to t_end; else the run ends as `Outcome::stalled`. With `max_steps`, 20 000 of
+    /// them (or `stall_steps`, if less) without an event also have to advance it at a pace at which
+    /// a hundred times `max_steps` would reach t_end. 0: no limit.
     std::uint64_t stall_steps = 1'000'000;
 
     /// Flag, set from another thread or a signal handler, that ends the run after the step in
