@@ -84,7 +84,9 @@ TEST_F(App, SystemsWithFrictionAndImpactsTakeTheirIntegrators)
     EXPECT_NEAR(ball["events"][0]["t"].get<double>(), 0.9 / (9.81 * (1.05 - 0.05)), 1e-12);
     EXPECT_EQ(ball["mode"], "at rest on the plate");
     const nlohmann::json twisting = json({"simulate", "super-twisting", "--json"});
-    EXPECT_EQ(twisting["state"], nlohmann::json({0.0, 0.0}));
+    // At rest to the last bit, or where a step's rounding of 1e-4 of its sums has left it.
+    EXPECT_EQ(twisting["state"][0], 0.0);
+    EXPECT_NEAR(twisting["state"][1].get<double>(), 0, 1e-19);
     const nlohmann::json incline = json({"simulate", "incline-block", "--json"});
     EXPECT_NEAR(incline["state"][0].get<double>(), 0, 1e-10);
     const nlohmann::json block = json({"simulate", "two-contact-block", "--json"});

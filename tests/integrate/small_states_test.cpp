@@ -155,6 +155,26 @@ TYPED_TEST(SmallStates, AreSavedWithTheirComponentsAlone)
     EXPECT_THROW(of_other_size.restore(snapshot), std::invalid_argument);
 }
 
+TYPED_TEST(SmallStates, ShowARunThatIsKeptUpToDate)
+{
+    // References to the state and to the records, taken once, follow the run.
+    const Ring ring;
+    const auto x0 = start<TypeParam::value>();
+    Simulation simulation(ring, x0, {.t_end = 12});
+    const auto& x = simulation.x();
+    const auto& run = simulation.run();
+    ASSERT_TRUE(simulation.advance());
+    EXPECT_EQ(run.events.size(), 1u);
+    EXPECT_EQ(run.statistics.events, 1u);
+    EXPECT_EQ(x, run.events[0].after);
+    while (simulation.step()) {
+    }
+    EXPECT_EQ(run.statistics.events, run.events.size());
+    EXPECT_GT(run.events.size(), 3u);
+    EXPECT_EQ(x, simulation.x());
+    EXPECT_EQ(plain(x), plain(simulation.take().x));
+}
+
 /// A host's step along a straight line, with arrays of exactly n doubles on the heap: an address
 /// sanitizer sees any access beyond them.
 struct StraightStep {

@@ -151,6 +151,20 @@ private:
     Locator locator_;
 };
 
+/// Drops records that an exception has undone.
+template <class X>
+void drop_beyond(Run<X>& run, std::size_t events, std::size_t samples, std::size_t pieces)
+{
+    const auto shorten = [](auto& records, std::size_t size) {
+        if (records.size() <= size) return;
+        records.erase(records.begin() + static_cast<std::ptrdiff_t>(size), records.end());
+    };
+    shorten(run.events, events);
+    shorten(run.trajectory.t, samples);
+    shorten(run.trajectory.x, samples);
+    if (run.solution.size() > pieces) run.solution.shrink(pieces);
+}
+
 /// Brings `to` up to date with the records in `run`, converting only the new ones.
 template <class X>
 void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
@@ -163,12 +177,13 @@ void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
     to.guard = run.guard;
     to.other_guard = run.other_guard;
     to.statistics = run.statistics;
+    drop_beyond(to, run.events.size(), run.trajectory.x.size(), run.solution.size());
     if (to.events.empty()) to.events.reserve(run.events.size());
     for (std::size_t i = to.events.size(); i < run.events.size(); ++i) {
         to.events.push_back(as_callers(run.events[i], like));
     }
-    to.trajectory.t = run.trajectory.t;
     for (std::size_t i = to.trajectory.x.size(); i < run.trajectory.x.size(); ++i) {
+        to.trajectory.t.push_back(run.trajectory.t[i]);
         to.trajectory.x.push_back(convert(run.trajectory.x[i]));
     }
     to.solution.add_from(run.solution, convert);
@@ -231,10 +246,12 @@ template <class X>
                                     const Options& options)
 {
     if constexpr (std::is_same_v<CoreState<X>, SmallState> && is_array<X>) {
-        Run<X> out;
+        std::vector<Event<X>> events;
         setup.add_event = &add_event<X>;
-        setup.events = &out.events;
+        setup.events = &events;
+        Run<X> out;
         update(out, run_whole(setup, core_state(x0), options), x0);
+        out.events = std::move(events);
         return out;
     } else {
         return as_callers<X>(run_whole(setup, core_state(x0), options), x0);
@@ -300,6 +317,7 @@ public:
         if constexpr (same) {
             return loop_->x();
         } else {
+            shown_.asked = true;
             detail::copy_state(loop_->x(), shown_.x);
             return shown_.x;
         }
@@ -312,6 +330,7 @@ public:
         if constexpr (same) {
             return loop_->run();
         } else {
+            shown_.asked_run = true;
             detail::update(shown_.run, loop_->run(), shown_.x);
             return shown_.run;
         }
@@ -322,12 +341,22 @@ public:
 
     /// Takes one step, with any events that it holds. False: the run has ended. A detector
     /// that defers checks does not look ahead here, since every step is final.
-    bool step() { return loop_->step(); }
+    bool step()
+    {
+        const bool goes_on = loop_->step();
+        refresh();
+        return goes_on;
+    }
 
     /// Advances to the next sample time, or to the end of the next step that holds events;
     /// `t`, `x` and `mode` are those there, after the events. False: the run has ended, and
     /// everything that happened in it has been shown.
-    bool advance() { return loop_->advance(); }
+    bool advance()
+    {
+        const bool goes_on = loop_->advance();
+        refresh();
+        return goes_on;
+    }
 
     /// Advances to the end. Calls `observe(event)` for every recorded event and
     /// `observe(simulation)` after every step, each if `observe` accepts it. Both
@@ -344,6 +373,7 @@ public:
         loop_->show_all();
         while (!ended()) {
             loop_->advance_once(!watches_steps);
+            refresh();
             if constexpr (requires(const Event<X>& event) { observe(event); }) {
                 for (; seen < events.size(); ++seen) show(events[seen], observe);
             }
@@ -367,7 +397,11 @@ public:
 
     /// @throws std::invalid_argument naming what does not agree if the snapshot is of another
     /// run, or does not hold a valid state; then nothing has changed.
-    void restore(const Snapshot& snapshot) { loop_->restore(snapshot); }
+    void restore(const Snapshot& snapshot)
+    {
+        loop_->restore(snapshot);
+        refresh();
+    }
 
 private:
     /// Result of a run with states of another type than the loop's.
@@ -375,7 +409,16 @@ private:
         explicit Shown(const X& like) : x(like) {}
         X x;
         Run<X> run;
+        bool asked = false, asked_run = false;  ///< references to them are kept up to date
     };
+
+    void refresh()
+    {
+        if constexpr (!same) {
+            if (shown_.asked) detail::copy_state(loop_->x(), shown_.x);
+            if (shown_.asked_run) detail::update(shown_.run, loop_->run(), shown_.x);
+        }
+    }
 
     template <class Observer>
     void show(const Event<C>& event, Observer& observe) const
