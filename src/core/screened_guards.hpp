@@ -358,8 +358,7 @@ protected:
     /// Calls `visit(i)` for the guards for which `condition`, which has no branches, holds, in
     /// ascending order.
     template <class Condition, class Visit>
-    [[gnu::always_inline]] void for_each_that(const Condition& condition,
-                                              const Visit& visit) const noexcept
+    [[gnu::always_inline]] void for_each_that(const Condition& condition, const Visit& visit) const
     {
         std::size_t first = 0;
         for (; first + block <= size(); first += block) {

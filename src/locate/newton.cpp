@@ -40,9 +40,6 @@ double hermite_root(double v0, double r0, double v1, double r1, double sign) noe
 
 namespace {
 
-/// Largest fraction of a bracket over which Heun's step along the flow is as good as a repeat of
-/// the step: a twelfth of its cube is 5e-18.
-constexpr double bent_part = 0x1p-18;
 /// Number of consecutive corrections that may fail to halve the one before.
 constexpr int most_linear = 4;
 
@@ -276,8 +273,6 @@ Location Search::run()
     double last_value = std::numeric_limits<double>::infinity();
     int linear = 0;
     Location where;
-    double from = std::numeric_limits<double>::quiet_NaN();  // of a state that is still at hand
-    detail::Bracket kept{};
     for (;;) {
         const double width = bracket_.width();
         const double finest = path_.finest(hi.s);
@@ -285,10 +280,7 @@ Location Search::run()
         s = inside(s, finest);
         if (std::isnan(s)) break;
 
-        const bool beside = std::fabs(s - from) <= bent_part * scale_.h;
-        if (beside) kept = bracket_;
-        const GuardSample sample =
-            beside ? path_.value_and_rate_beside(from, s) : path_.value_and_rate(s);
+        const GuardSample sample = path_.value_and_rate(s);
         const bool beyond = path_.has_left(sample);
         curvature_ = std::max(std::max(curvature_, bend(lo, sample)), bend(sample, hi));
         const GuardSample replaced = beyond ? hi : lo;
@@ -297,18 +289,11 @@ Location Search::run()
         const double distance = std::fabs(correction);
         if (is_straight(sample, distance, width, finest)) {
             if (ends_straight(sample, correction, where)) return where;
-        } else if (!beside && scale_.may_be(sample.value) &&
+        } else if (scale_.may_be(sample.value) &&
                    std::fabs(last_value) < 16 * std::fabs(sample.value)) {
             const double noise = detail::close_in_noise(
                 path_, sample, {s + correction, sample.value}, scale_, bracket_);
             if (noise > 0) return hidden(sample.rate, noise);
-        }
-        if (beside) {
-            // The step's own map may pass by at the distance of its error: what was found along
-            // the flow only serves to end the search.
-            bracket_ = kept;
-            from = std::numeric_limits<double>::quiet_NaN();
-            continue;
         }
         last_value = sample.value;
         // Repeatedly not halved: a root of higher order, a pole, or no root.
@@ -316,7 +301,6 @@ Location Search::run()
         last_distance = distance;
         if (linear == most_linear || !std::isfinite(correction)) {
             linear = 0;
-            from = std::numeric_limits<double>::quiet_NaN();
             size_ = std::max(size_, detail::narrow_by_values(path_, bracket_, replaced, tolerance_,
                                                              1e-3 * width));
             path_.complete(lo);
@@ -326,7 +310,6 @@ Location Search::run()
             continue;
         }
         // Converged from one side: sample the other side.
-        from = s;
         past = distance > finest ? 0 : past > 0 ? 4 * past : finest;
         s += correction + (beyond ? -past : past);
         // Three samples have not halved the bracket: bisect.

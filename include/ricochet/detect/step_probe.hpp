@@ -176,13 +176,6 @@ public:
     {
         return {.s = s, .value = value_along_the_flow(from.s, s), .rate = from.rate};
     }
-    /// The guard and its rate at offset s, so near `from`, which must be where `value_and_rate` or
-    /// this function took the last sample, that Heun's step along the flow is as good as a repeat
-    /// of the step.
-    [[nodiscard]] GuardSample value_and_rate_beside(double from, double s)
-    {
-        return sample(s, point_beside(from, s));
-    }
     /// Tells the path that the root lies `correction` [s] after the last sample that
     /// `value_and_rate` took, and that the motion is straight until there.
     virtual void settle(double correction) = 0;
@@ -215,7 +208,6 @@ protected:
     [[nodiscard]] virtual double dense_value_at(double s) = 0;
     [[nodiscard]] virtual Point dense_point_at(double s) = 0;
     [[nodiscard]] virtual double value_along_the_flow(double from, double s) = 0;
-    [[nodiscard]] virtual Point point_beside(double from, double s) = 0;
 
     PathProperties properties_;
     Path path_;
@@ -395,27 +387,6 @@ private:
             placed_ = s;
         }
         return point_of_space(s);
-    }
-
-    [[nodiscard]] Point point_beside(double from, double s) override
-    {
-        if (path_ == Path::dense || !follows_flow()) return point_at(s);
-        const double half = (s - from) / 2;
-        detail::move(space_->x, space_->x, half, space_->dxdt);
-        detail::move(space_->root, space_->x, half, space_->dxdt);
-        step_->flow(s, space_->root, space_->dxdt);
-        detail::move(space_->x, space_->x, half, space_->dxdt);
-        placed_ = s;
-        return point_of_space(s);
-    }
-
-    /// Whether the step's own map follows the flow closely enough for short steps along the flow.
-    [[nodiscard]] bool follows_flow() const noexcept
-    {
-        if constexpr (requires { step_->is_hosts(); }) {
-            if (step_->is_hosts()) return false;
-        }
-        return step_->order() >= 4;
     }
 
     /// The guard and its rate at the state and the flow in the work space.
