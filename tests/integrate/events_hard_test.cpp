@@ -775,7 +775,7 @@ TEST(HardEvents, ARecordedGuardHasItsEventOnceWhereAResetSharesItsSurface)
             const auto recorded =
                 std::count_if(run.events.begin(), run.events.end(), [&](const auto& other) {
                     return other.guard == 1 && changes_sign(other.kind) &&
-                           std::fabs(other.t - event.t) < 1e-9;
+                           std::fabs(other.t - event.t) < 1e-6;
                 });
             if (recorded == 0 && std::fabs(event.slope) < 0.05) {
                 ++grazes;
