@@ -1,3 +1,3 @@
-#include "inclusions_of_six.hpp"
+#include "ricochet/nonsmooth/solvers.hpp"
 
-RICOCHET_INCLUSIONS_WITHOUT_MODES_OF(6, 5, )
+RICOCHET_INCLUSIONS_OF(6, 5, )

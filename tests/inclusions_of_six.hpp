@@ -4,4 +4,4 @@
 
 #include "ricochet/nonsmooth/hand_over.hpp"
 
-RICOCHET_INCLUSIONS_WITHOUT_MODES_OF(6, 5, extern)
+RICOCHET_INCLUSIONS_OF(6, 5, extern)

@@ -7,11 +7,10 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/nonsmooth/solvers.hpp"
 
 namespace ricochet::test {
 
-using detail::AnyHandOver;
 using detail::AnyMotion;
 using detail::inclusion_of;
 using detail::resized;
@@ -36,10 +35,10 @@ auto run_in(const System& system, const StateOf<System>& w0, const HandOverOptio
 {
     detail::EventStepping<N, M> stepping;
     if constexpr (Branching<System>) {
-        stepping = {&detail::make_event_loop<N, M, ErrorControlled<Dopri5>>, true};
+        stepping = {&detail::make_dopri5_loop<N, M>, true};
     }
-    AnyHandOver<N, M> run(inclusion_of<N, M>(system), resized<N>(w0), options, stepping);
-    return detail::resized_run<state_size<System>, reaction_size<System>>(run.take());
+    const auto run = detail::make_hand_over<N, M>(inclusion_of<N, M>(system), resized<N>(w0), options, stepping);
+    return detail::resized_run<state_size<System>, reaction_size<System>>(detail::take_run<N, M>(*run));
 }
 
 template <class Run>

@@ -1,6 +1,5 @@
-#include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/nonsmooth/solvers.hpp"
 
-RICOCHET_SET_VALUED_OF(1, 1, )
-RICOCHET_HAND_OVER_OF(1, 1, )
-RICOCHET_MODES_OF(1, 1, )
-RICOCHET_EVENTS_OF(1, 1, Dopri5, )
+RICOCHET_SET_VALUED_OF(1, 1)
+RICOCHET_HAND_OVER_OF(1, 1)
+RICOCHET_DOPRI5_OF(1, 1)

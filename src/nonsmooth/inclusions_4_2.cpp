@@ -1,6 +1,5 @@
-#include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/nonsmooth/solvers.hpp"
 
-RICOCHET_SET_VALUED_OF(4, 2, )
-RICOCHET_HAND_OVER_OF(4, 2, )
-RICOCHET_MODES_OF(4, 2, )
-RICOCHET_EVENTS_OF(4, 2, Dopri5, )
+RICOCHET_SET_VALUED_OF(4, 2)
+RICOCHET_HAND_OVER_OF(4, 2)
+RICOCHET_DOPRI5_OF(4, 2)

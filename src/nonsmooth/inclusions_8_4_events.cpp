@@ -1,4 +1,3 @@
-#include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/nonsmooth/solvers.hpp"
 
-RICOCHET_MODES_OF(8, 4, )
-RICOCHET_EVENTS_OF(8, 4, Dopri5, )
+RICOCHET_DOPRI5_OF(8, 4)

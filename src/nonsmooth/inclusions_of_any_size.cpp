@@ -1,3 +1,4 @@
-#include "ricochet/nonsmooth/set_valued_motion.hpp"
+#include "ricochet/nonsmooth/solvers.hpp"
 
-RICOCHET_SET_VALUED_OF(Eigen::Dynamic, Eigen::Dynamic, )
+RICOCHET_SET_VALUED_OF(Eigen::Dynamic, Eigen::Dynamic)
+RICOCHET_HAND_OVER_OF(Eigen::Dynamic, Eigen::Dynamic)

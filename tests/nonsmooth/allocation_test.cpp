@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "allocations.hpp"
 #include "problems/incline_block.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
@@ -21,6 +23,21 @@ void expect_no_allocation(const System& system, const StateOf<System>& w0,
     EXPECT_EQ(outcome, Outcome::reached_end);
     EXPECT_GT(motion.statistics().accepted, 20U);
 }
+
+/// A size that the library has not compiled: two masses between springs, with friction, and a filter.
+struct TwoMasses {
+    static constexpr int state_size = 5;
+    static constexpr int reaction_size = 2;
+    using Vector = Eigen::Matrix<double, 5, 1>;
+    void smooth(double t, const Vector& w, Vector& f) const
+    {
+        f << std::sin(t) - w[2], w[2] - 2 * w[3], w[0] - w[1], w[1], w[2] - w[4];
+    }
+    [[nodiscard]] sets::Box<2> reaction_set(double, const Vector&) const
+    {
+        return {{-0.3, -0.2}, {0.3, 0.2}};
+    }
+};
 
 TEST(NonsmoothAllocation, TheCounterCounts)
 {
@@ -50,6 +67,13 @@ TEST(NonsmoothAllocation, StepsOfFixedSizeAllocateNothing)
          .step = 0.01,
          .scheme = {.stage = {.method = StageMethod::fixed_point, .tolerance = 1e-10}}});
     expect_no_allocation(InclineBlock(), {1, 1, 0, 0}, {.t_end = 1, .step = 0.01});
+    for (const StageMethod method : {StageMethod::automatic, StageMethod::newton}) {
+        expect_no_allocation(
+            TwoMasses(), {1, 0, 0, 0, 0},
+            {.t_end = 1, .step = 0.01, .scheme = {.stage = {.method = method}}});
+    }
+    expect_no_allocation(TwoMasses(), {1, 0, 0, 0, 0},
+                         {.t_end = 1, .step = 0.01, .switches = Switches::located});
 }
 
 }  // namespace

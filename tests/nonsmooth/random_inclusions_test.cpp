@@ -2,6 +2,7 @@
 
 #include "random_inclusions.hpp"
 #include "inclusions_of_six.hpp"
+#include "ricochet/nonsmooth/solvers.hpp"
 
 #include <gtest/gtest.h>
 

@@ -17,13 +17,6 @@
 
 namespace ricochet::detail {
 
-/// The options with defaults filled in.
-/// @throws std::invalid_argument naming the option.
-[[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
-
-void add(Statistics& sum, const Statistics& more) noexcept;
-void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
-
 struct NoneHeld {};
 
 /// `HandOver` for systems of any type.
@@ -594,6 +587,30 @@ AnyHandOverRun<N, M> AnyHandOver<N, M>::take()
     }
     run_.statistics.set_valued = motion_.statistics();
     return std::move(run_);
+}
+
+template <int N, int M>
+std::shared_ptr<AnyHandOver<N, M>> make_hand_over(const AnyInclusion<N, M>& inclusion,
+                                                  const Eigen::Matrix<double, N, 1>& w0,
+                                                  const HandOverOptions& options,
+                                                  const EventStepping<N, M>& stepping)
+{
+    return std::make_shared<AnyHandOver<N, M>>(inclusion, w0, options, stepping);
+}
+
+template <int N, int M>
+std::shared_ptr<AnyHandOver<N, M>> make_hand_over(const AnyInclusion<N, M>& inclusion,
+                                                  const StateWithReaction<N, M>& start,
+                                                  const HandOverOptions& options,
+                                                  const EventStepping<N, M>& stepping)
+{
+    return std::make_shared<AnyHandOver<N, M>>(inclusion, start, options, stepping);
+}
+
+template <int N, int M>
+AnyHandOverRun<N, M> take_run(AnyHandOver<N, M>& hand_over)
+{
+    return hand_over.take();
 }
 
 }  // namespace ricochet::detail

@@ -21,6 +21,7 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "ricochet/detail/branch_terms.hpp"
@@ -359,32 +360,19 @@ private:
     Eigen::Matrix<Eigen::Index, M, 1> selected_;
 };
 
-template <int N, int M>
-AnyMatrices<N, M>::AnyMatrices(const Any& inclusion) : inclusion_(inclusion)
-{
-    const Eigen::Index own = inclusion.size();
-    const Eigen::Index n = N == Eigen::Dynamic ? own : N;
-    const Eigen::Index m = M == Eigen::Dynamic ? inclusion.reactions() : M;
-    mass_.setIdentity(n, n);
-    inclusion.mass(mass_);
-    if (!mass_.allFinite()) refuse_inclusion("the matrix A is not finite");
-    Eigen::MatrixXd inverse = mass_.topLeftCorner(own, own);
-    if (const Eigen::Index rank = invert(inverse, inverse); rank < own) {
-        refuse_inclusion("the matrix A is singular; its rank is", static_cast<double>(rank));
-    }
-    inverse_mass_.setIdentity(n, n);
-    inverse_mass_.topLeftCorner(own, own) = inverse;
-
-    observe_.setZero(m, n);
-    inclusion.observe(observe_);
-    act_ = observe_.transpose();
-    inclusion.act(act_);
-    if (!observe_.allFinite() || !act_.allFinite()) {
-        refuse_inclusion("the matrices E and G must be finite");
-    }
-    find_selected();
-}
-
 }  // namespace detail
+
+/// The reaction that the motion takes from (t, w); see minimal_selection.hpp.
+template <int N, int M>
+[[nodiscard]] Eigen::Matrix<double, M, 1> minimal_selection(
+    const detail::AnyMatrices<N, M>& m, double t,
+    const std::type_identity_t<Eigen::Matrix<double, N, 1>>& w);
+
+/// How far a state and its reaction violate their law; see law.hpp.
+template <int N, int M>
+[[nodiscard]] double law_violation(
+    const detail::AnyMatrices<N, M>& m, double t,
+    const std::type_identity_t<Eigen::Matrix<double, N, 1>>& w,
+    const std::type_identity_t<Eigen::Matrix<double, M, 1>>& reaction, double span);
 
 }  // namespace ricochet

@@ -23,8 +23,8 @@
 #include <span>
 
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/composite_step.hpp"
 #include "ricochet/detail/filippov_motion.hpp"
-#include "ricochet/detail/minimal_selection.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {

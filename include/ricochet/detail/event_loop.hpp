@@ -23,6 +23,13 @@ namespace ricochet::detail {
 /// the run is over.
 [[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;
 
+/// The options with defaults filled in.
+/// @throws std::invalid_argument naming the option.
+[[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
+
+void add(Statistics& sum, const Statistics& more) noexcept;
+void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
+
 /// A simulation with N components, for systems and steppers of any type.
 template <int N>
 class EventLoop {
@@ -86,11 +93,37 @@ struct EventStepping {
 };
 
 template <int N, int M, class Stepping>
-std::unique_ptr<EventLoop<N>> make_event_loop(const AnyModes<N, M>& modes,
-                                              const typename EventLoop<N>::X& x,
-                                              const Options& options)
+std::unique_ptr<EventLoop<N>> make_event_loop(
+    const AnyModes<N, M>& modes, const std::array<double, static_cast<std::size_t>(N)>& x,
+    const Options& options)
 {
     return std::make_unique<EventLoopBy<N, AnyModes<N, M>, Stepping>>(modes, x, options);
 }
+
+// Defined where solvers are compiled (nonsmooth/solvers.hpp).
+
+/// The same with Dormand and Prince's method; null where there are no modes.
+template <int N, int M>
+[[nodiscard]] std::unique_ptr<EventLoop<N>> make_dopri5_loop(
+    const AnyModes<N, M>& modes, const std::array<double, static_cast<std::size_t>(N)>& x,
+    const Options& options);
+
+// The loop of a hand-over (any_hand_over.hpp), and what makes and runs it.
+
+template <int N, int M>
+class RICOCHET_ALIGNED AnyHandOver;
+
+template <int N, int M>
+[[nodiscard]] std::shared_ptr<AnyHandOver<N, M>> make_hand_over(
+    const AnyInclusion<N, M>& inclusion, const Eigen::Matrix<double, N, 1>& w0,
+    const HandOverOptions& options, const EventStepping<N, M>& stepping);
+
+template <int N, int M>
+[[nodiscard]] std::shared_ptr<AnyHandOver<N, M>> make_hand_over(
+    const AnyInclusion<N, M>& inclusion, const StateWithReaction<N, M>& start,
+    const HandOverOptions& options, const EventStepping<N, M>& stepping);
+
+template <int N, int M>
+[[nodiscard]] AnyHandOverRun<N, M> take_run(AnyHandOver<N, M>& hand_over);
 
 }  // namespace ricochet::detail

@@ -6,8 +6,7 @@
 // sizes. Those of the sizes below are compiled in the library. A system of another size, of at most
 // 8 components and 4 reactions, runs in the first of them that holds it (any_inclusion.hpp): with
 // the same bits, in 1.2 to 4 times the time. For its exact size, and for larger ones, the solvers
-// are compiled in 50 s by RICOCHET_INCLUSIONS_OF, with `extern` in a header that all files with the
-// system include, and with nothing in one of them.
+// are compiled by RICOCHET_INCLUSIONS_OF, in a minute of a source of their own.
 #pragma once
 
 #include <array>
@@ -20,50 +19,53 @@
         declare(4, 2, __VA_ARGS__) declare(8, 4, __VA_ARGS__)
 
 /// Set-valued steps.
-#define RICOCHET_SET_VALUED_OF(N, M, how)                                       \
-    how template class ricochet::detail::AnyMatrices<N, M>;                     \
-    how template class ricochet::detail::AnyStep<N, M>;                         \
-    how template class ricochet::detail::AnyMotion<N, M>;                       \
-    how template Eigen::Matrix<double, M, 1> ricochet::minimal_selection<N, M>( \
+#define RICOCHET_SET_VALUED_OF(N, M)                                        \
+    template class ricochet::detail::AnyMatrices<N, M>;                     \
+    template class ricochet::detail::AnyStep<N, M>;                         \
+    template class ricochet::detail::AnyMotion<N, M>;                       \
+    template Eigen::Matrix<double, M, 1> ricochet::minimal_selection<N, M>( \
         const ricochet::detail::AnyMatrices<N, M>&, double, const Eigen::Matrix<double, N, 1>&);
 
 /// The hand-over, without its event-driven phases.
-#define RICOCHET_HAND_OVER_OF(N, M, how)                                                           \
-    how template double ricochet::law_violation<N, M>(const ricochet::detail::AnyMatrices<N, M>&,  \
-                                                      double, const Eigen::Matrix<double, N, 1>&,  \
-                                                      const Eigen::Matrix<double, M, 1>&, double); \
-    how template class ricochet::detail::AnyHandOver<N, M>;
+#define RICOCHET_HAND_OVER_OF(N, M)                                                            \
+    template double ricochet::law_violation<N, M>(const ricochet::detail::AnyMatrices<N, M>&,  \
+                                                  double, const Eigen::Matrix<double, N, 1>&,  \
+                                                  const Eigen::Matrix<double, M, 1>&, double); \
+    template std::shared_ptr<ricochet::detail::AnyHandOver<N, M>>                              \
+    ricochet::detail::make_hand_over<N, M>(                                                    \
+        const ricochet::detail::AnyInclusion<N, M>&, const Eigen::Matrix<double, N, 1>&,       \
+        const ricochet::HandOverOptions&, const ricochet::detail::EventStepping<N, M>&);       \
+    template std::shared_ptr<ricochet::detail::AnyHandOver<N, M>>                              \
+    ricochet::detail::make_hand_over<N, M>(const ricochet::detail::AnyInclusion<N, M>&,        \
+                                           const ricochet::detail::StateWithReaction<N, M>&,   \
+                                           const ricochet::HandOverOptions&,                   \
+                                           const ricochet::detail::EventStepping<N, M>&);      \
+    template ricochet::detail::AnyHandOverRun<N, M> ricochet::detail::take_run<N, M>(          \
+        ricochet::detail::AnyHandOver<N, M>&);
 
-/// The modes of at most four reactions, and their simulation by one method with error control.
-#define RICOCHET_MODES_OF(N, M, how) how template class ricochet::detail::AnyModes<N, M>;
-#define RICOCHET_EVENTS_OF(N, M, Method, how)                                              \
-    how template std::unique_ptr<ricochet::detail::EventLoop<N>>                           \
-    ricochet::detail::make_event_loop<N, M, ricochet::ErrorControlled<ricochet::Method>>(  \
-        const ricochet::detail::AnyModes<N, M>&, const ricochet::detail::EventLoop<N>::X&, \
+/// The simulation of the modes of at most four reactions, by Dormand and Prince's method, or by
+/// another one with error control.
+#define RICOCHET_DOPRI5_OF(N, M)                                                        \
+    template std::unique_ptr<ricochet::detail::EventLoop<N>>                            \
+    ricochet::detail::make_dopri5_loop<N, M>(const ricochet::detail::AnyModes<N, M>&,   \
+                                             const std::array<double, std::size_t(N)>&, \
+                                             const ricochet::Options&);
+#define RICOCHET_EVENTS_OF(N, M, Method, how)                                               \
+    how template std::unique_ptr<ricochet::detail::EventLoop<N>>                            \
+    ricochet::detail::make_event_loop<N, M, ricochet::ErrorControlled<ricochet::Method>>(   \
+        const ricochet::detail::AnyModes<N, M>&, const std::array<double, std::size_t(N)>&, \
         const ricochet::Options&);
 
-/// All of these, with Dormand and Prince's method, for systems of exactly this size.
-#define RICOCHET_INCLUSIONS_OF(N, M, how)           \
-    template <>                                     \
-    struct ricochet::detail::CompiledExactly<N, M>; \
-    RICOCHET_SET_VALUED_OF(N, M, how)               \
-    RICOCHET_HAND_OVER_OF(N, M, how)                \
-    RICOCHET_MODES_OF(N, M, how)                    \
-    RICOCHET_EVENTS_OF(N, M, Dopri5, how)
-
-/// The same for more than four reactions, which have no modes. (clang 14 would instantiate members
-/// of the hand-over whose constraints these sizes do not satisfy; there each file compiles its
-/// own.)
-#define RICOCHET_INCLUSIONS_WITHOUT_MODES_OF(N, M, how) \
-    template <>                                         \
-    struct ricochet::detail::CompiledExactly<N, M>;     \
-    RICOCHET_SET_VALUED_OF(N, M, how)                   \
-    RICOCHET_HAND_OVER_WITHOUT_MODES_OF(N, M, how)
-#ifdef __clang__
-#define RICOCHET_HAND_OVER_WITHOUT_MODES_OF(N, M, how)
-#else
-#define RICOCHET_HAND_OVER_WITHOUT_MODES_OF(N, M, how) RICOCHET_HAND_OVER_OF(N, M, how)
-#endif
+/// Runs systems of N components and M reactions in solvers of exactly this size. With `extern` as
+/// its third argument it says that they are compiled elsewhere; with nothing it compiles them, and
+/// needs nonsmooth/solvers.hpp. More than four reactions have no modes.
+#define RICOCHET_INCLUSIONS_OF(N, M, how) RICOCHET_INCLUSIONS_OF_##how(N, M)
+#define RICOCHET_INCLUSIONS_OF_extern(N, M) \
+    template <>                             \
+    struct ricochet::detail::CompiledExactly<N, M>;
+#define RICOCHET_INCLUSIONS_OF_(N, M)                                                            \
+    RICOCHET_INCLUSIONS_OF_extern(N, M) RICOCHET_SET_VALUED_OF(N, M) RICOCHET_HAND_OVER_OF(N, M) \
+        RICOCHET_DOPRI5_OF(N, M)
 
 /// Time stepping of N coordinates, and the hand-over from flight by one method.
 #define RICOCHET_TIME_STEPPING_OF(N, how) how template class ricochet::detail::AnyTimeStepping<N>;
@@ -100,6 +102,9 @@ template <int n, int m>
     };
 #if RICOCHET_ALIGNED_AS_LIBRARY
     constexpr bool fixed = n > 0 && m > 0;
+    static_assert(
+        exactly || fixed || (n < 0 && m < 0),
+        "ricochet: found an inclusion of which one size is Eigen::Dynamic; expected both");
     if constexpr (!exactly && fixed) {
         for (const InclusionSize size : compiled_sizes) {
             if (n <= size.components && m <= size.reactions) return size;
@@ -108,10 +113,10 @@ template <int n, int m>
             n <= compiled_sizes.back().components && m <= compiled_sizes.back().reactions,
             "ricochet: found an inclusion of more than 8 components or 4 reactions, which the "
             "library has not compiled; expected RICOCHET_INCLUSIONS_OF(state_size, reaction_size, "
-            ") "
-            "before its first use, RICOCHET_INCLUSIONS_WITHOUT_MODES_OF for more than 4 reactions, "
-            "or "
-            "sizes of Eigen::Dynamic");
+            "extern) "
+            "before its first use and, in one source with nonsmooth/solvers.hpp, the same without "
+            "`extern`; "
+            "or sizes of Eigen::Dynamic");
     }
 #endif
     return {n, m};

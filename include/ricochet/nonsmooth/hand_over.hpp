@@ -15,11 +15,13 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 #include <type_traits>
 
-#include "ricochet/detail/any_hand_over.hpp"
+#include "ricochet/detail/event_loop.hpp"
 #include "ricochet/detail/hand_over_run.hpp"
+#include "ricochet/detail/hand_over_watches.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/padded_run.hpp"
 #include "ricochet/detail/refused_calls.hpp"
@@ -44,35 +46,43 @@ public:
     /// @throws std::invalid_argument for invalid options, systems and initial
     /// states.
     HandOver(const System& system, const Vector& w0, const HandOverOptions& options)
-        : by_(detail::solver_inclusion(system), detail::resized<N>(w0), options, stepping())
+        : by_(detail::make_hand_over<N, M>(detail::solver_inclusion(system), detail::resized<N>(w0),
+                                           options, stepping()))
     {
     }
 
     /// Starts from the state of an earlier run, with its reaction.
     /// @throws std::invalid_argument also if the reaction lies outside the set.
     HandOver(const System& system, const State& start, const HandOverOptions& options)
-        : by_(detail::solver_inclusion(system), detail::resized<N, M>(start), options, stepping())
+        : by_(detail::make_hand_over<N, M>(detail::solver_inclusion(system),
+                                           detail::resized<N, M>(start), options, stepping()))
     {
     }
 
     /// Advances to the end and returns the result, whatever the outcome.
     [[nodiscard]] HandOverRun<System> take()
     {
-        return {detail::resized_run<state_size<System>, reaction_size<System>>(by_.take())};
+        return {detail::resized_run<state_size<System>, reaction_size<System>>(
+            detail::take_run<N, M>(*by_))};
     }
 
 private:
     [[nodiscard]] static detail::EventStepping<N, M> stepping()
     {
         if constexpr (Branching<System>) {
-            return {&detail::make_event_loop<N, M, Stepping>,
-                    std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>};
+            constexpr bool controlled =
+                std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>;
+            if constexpr (std::is_same_v<Stepping, ErrorControlled<Dopri5>>) {
+                return {&detail::make_dopri5_loop<N, M>, controlled};
+            } else {
+                return {&detail::make_event_loop<N, M, Stepping>, controlled};
+            }
         } else {
             return {};
         }
     }
 
-    detail::AnyHandOver<N, M> by_;
+    std::shared_ptr<detail::AnyHandOver<N, M>> by_;
 };
 
 /// Runs a whole inclusion in one call.
@@ -96,11 +106,10 @@ requires(!Inclusion<System>)  //
 }  // namespace ricochet
 
 #if RICOCHET_ALIGNED_AS_LIBRARY
-RICOCHET_COMPILED_SIZES(RICOCHET_HAND_OVER_OF, extern)
-RICOCHET_COMPILED_SIZES(RICOCHET_MODES_OF, extern)
-RICOCHET_COMPILED_SIZES(RICOCHET_EVENTS_OF, Dopri5, extern)
 RICOCHET_EVENTS_OF(1, 1, Fehlberg78, extern)
 RICOCHET_EVENTS_OF(3, 1, Fehlberg78, extern)
+#else
+#include "ricochet/nonsmooth/solvers.hpp"
 #endif
 
 namespace ricochet {

@@ -15,9 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/debug_checks.hpp"
+#include "ricochet/detail/composite_step.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
-#include "ricochet/detail/minimal_selection.hpp"
 #include "ricochet/detail/padded_motion.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
@@ -453,109 +452,6 @@ private:
     Eigen::Index short_switches_ = 0;  // number of consecutive ones
 };
 
-template <int N, int M>
-AnyMotion<N, M>::AnyMotion(const AnyInclusion<N, M>& inclusion, const Vector& w0,
-                           const SetValuedOptions& options)
-    : options_(options), step_(inclusion, options.scheme)
-{
-    validate(options);
-    validate(options.controller);
-    if (options.estimate == ErrorEstimate::embedded &&
-        (options.scheme.scheme != Scheme::bathe ||
-         options.scheme.first_stage == FirstStage::at_end)) {
-        refuse_inclusion("the embedded estimate needs Bathe's scheme with the reaction averaged");
-    }
-    if (options.switches == Switches::located && !traits().box) {
-        refuse_inclusion("only the branches of a box can be located");
-    }
-    if (w0.size() != step_.matrices().size()) {
-        refuse_inclusion("the initial state must have as many components as the system, not",
-                         static_cast<double>(w0.size()));
-    }
-    validate_fields(options.fields, step_.matrices().own_size());
-    validate_policy(options, inclusion.step_layout());
-    rate_ = w0;
-    branches_before_.setConstant(step_.matrices().reactions(), Branch::inside);
-    branches_after_ = branches_before_;
-    h_ = options.step;
-    h_min_ = options.h_min > 0 ? options.h_min : 1e-12 * (options.t_end - options.t_start);
-    now_.w = error_ = w0;
-    now_.reaction.setZero(step_.matrices().reactions());
-    before_ = trial_ = half_ = now_;
-    start_branches_.setConstant(now_.reaction.size(), Branch::inside);
-    restart(options.t_start, w0);
-    before_ = now_;
-    if (is_debug_build()) {
-        inclusion.check_projection(options.t_start, w0);
-    }
-}
-
-template <int N, int M>
-void AnyMotion<N, M>::restart(double t, const Vector& w)
-{
-    now_.reaction = minimal_selection(step_.matrices(), t, w);
-    now_.t = t;
-    now_.w = w;
-    begin();
-}
-
-template <int N, int M>
-void AnyMotion<N, M>::restart(const State& state)
-{
-    check_start(step_.matrices(), state.t, state.w);
-    check_reaction(step_.matrices(), state);
-    now_ = state;
-    begin();
-}
-
-template <int N, int M>
-Outcome AnyMotion<N, M>::advance()
-{
-    if (outcome_ != Outcome::running) return outcome_;
-    int failures = 0;
-    bool solved = true;
-    for (;;) {
-        if (statistics_.attempted == options_.max_attempts) {
-            return end_with(Outcome::step_limit);
-        }
-        const double left = options_.t_end - now_.t;
-        if (left <= 4 * std::numeric_limits<double>::epsilon() * std::abs(options_.t_end)) {
-            // A change was located at the end, up to rounding.
-            now_.t = options_.t_end;
-            return end_with(Outcome::reached_end);
-        }
-        double h = std::min(h_, options_.h_max);
-        const bool last = is_last_step(h, now_.t, options_.t_end, statistics_.accepted);
-        if (last) h = left;
-        ++statistics_.attempted;
-        const StageReport report = attempt(h);
-        if (!report.converged) {
-            ++statistics_.unsolved;
-            failure_ = report;
-            solved = false;
-            h_ = h * std::visit([](auto& c) { return c.failed(); }, options_.controller);
-            ++failures;
-        } else {
-            const StepVerdict verdict =
-                judge(options_.controller, scaled_error_, h, [&] { return view(h); });
-            if (verdict.accepted) {
-                if (!holds_length_)
-                    h_ = h * verdict.factor;
-                else if (failures == 0 && !last)
-                    h_ = std::min(options_.step, 2 * h_);
-                accept(last);
-                return outcome_;
-            }
-            ++statistics_.rejected;
-            h_ = h * verdict.factor;
-            solved = true;
-        }
-        if (!(h_ >= h_min_)) {
-            return end_with(solved ? Outcome::step_underflow : Outcome::not_converged);
-        }
-    }
-}
-
 template <class System>
 using MotionOf =
     std::conditional_t<runs_exactly<System>, AnyMotion<state_size<System>, reaction_size<System>>,
@@ -589,7 +485,6 @@ public:
 
 }  // namespace ricochet
 
-#if RICOCHET_ALIGNED_AS_LIBRARY
-RICOCHET_COMPILED_SIZES(RICOCHET_SET_VALUED_OF, extern)
-RICOCHET_SET_VALUED_OF(Eigen::Dynamic, Eigen::Dynamic, extern)
+#if !RICOCHET_ALIGNED_AS_LIBRARY
+#include "ricochet/nonsmooth/solvers.hpp"
 #endif
