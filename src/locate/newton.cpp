@@ -238,9 +238,9 @@ bool Search::ends_straight(const GuardSample& sample, double correction, Locatio
     return noise > 0;
 }
 
-/// The place s, at the part u of the bracket, refined by the secant rule on the step's polynomial.
-/// Its error there is about a part of its last correction that is as small as the change of the
-/// slope.
+/// The place s, at the part u of the bracket, refined by the secant rule on the step's polynomial
+/// where the guard there differs from the cubic through its ends. Its error is about a part of the
+/// last correction that is as small as the change of the slope.
 [[gnu::noinline]] double Search::refined(double s, double u)
 {
     const auto& [lo, hi] = bracket_;
@@ -251,9 +251,11 @@ bool Search::ends_straight(const GuardSample& sample, double correction, Locatio
     GuardSample at = path_.dense_value(s);
     for (int k = 0; k < 3; ++k) {
         const double correction = -at.value / slope;
-        if (!(std::fabs(correction) <= 0.1 * h && bracket_.contains(s + correction))) break;
+        const double distance = std::fabs(correction);
+        if (distance <= 1e-6 * h) break;
+        if (!(distance <= 0.1 * h && bracket_.contains(s + correction))) break;
         s += correction;
-        if (std::fabs(correction) <= 1e-4 * h) break;
+        if (distance <= 1e-4 * h) break;
         const GuardSample next = path_.dense_value(s);
         slope = (next.value - at.value) / correction;
         at = next;

@@ -84,6 +84,16 @@ private:
         return run_.statistics.event_driven.steps + motion_.statistics().attempted;
     }
 
+    /// Whether a limited run cannot reach its end. A step whose guards are divided to the end costs
+    /// as much as hundreds, so 64 evaluations of a guard count as a step, too.
+    [[nodiscard]] bool stands_still(double t, const Statistics& phase) noexcept
+    {
+        if (options_.max_steps >= HandOverOptions{}.max_steps) return false;
+        const std::uint64_t calls = run_.statistics.event_driven.guard_calls + phase.guard_calls;
+        const std::uint64_t effort = steps_taken() + phase.steps + calls / 64;
+        return pace_(t, effort, run_.events.size() + phase.events);
+    }
+
     // --- event-driven ---
 
     void go_by_events(Mode mode, PhaseCause cause)
@@ -98,6 +108,7 @@ private:
     void follow_events() requires can_branch
     {
         if (steps_taken() >= options_.max_steps) return end_with(Outcome::step_limit);
+        if (stands_still(run_.state.t, {})) return end_with(Outcome::stalled);
         typename Modes::State x;
         Eigen::Map<Vector>(x.data()) = run_.state.w;
         std::unique_ptr<EventLoop<N>> simulation;
@@ -111,9 +122,10 @@ private:
         bool chatters = false;
         bool flutters = false;
         bool released = false;
+        bool stalled = false;
         Place before;
         held_.forget();
-        while (!chatters && !flutters && !released) {
+        while (!chatters && !flutters && !released && !stalled) {
             note_place(*simulation, before);
             const bool going = simulation->step();
             if (Modes::holds(before.mode) && !follows_held(before, *simulation)) {
@@ -129,6 +141,7 @@ private:
             released = options_.until_released &&
                        is_released(Modes::branches_of(simulation->mode()), simulation->t(),
                                    Modes::vector(simulation->x()));
+            stalled = stands_still(simulation->t(), simulation->run().statistics);
             chatters = watch(simulation->t(), simulation->run().statistics.events);
             const auto& events = simulation->run().events;
             if (!events.empty()) {
@@ -142,6 +155,7 @@ private:
         }
         finish_events(simulation->finish(), chatters, flutters);
         if (released && !set_valued_) end_with(Outcome::released);
+        if (stalled) end_with(Outcome::stalled);
     }
 
     /// Start of an event-driven step, and the number of records until then.
@@ -403,6 +417,8 @@ private:
                 end_with(Outcome::cancelled);
             } else if (steps_taken() >= options_.max_steps) {
                 end_with(Outcome::step_limit);
+            } else if (stands_still(motion_.state().t, {})) {
+                end_with(Outcome::stalled);
             }
             // Switches that are not located restart the count: `patience_` steps must have none.
             if (chatters_ && motion_.branches() != branches) {
@@ -537,6 +553,7 @@ private:
     AnyMotion<N, M> motion_;
     State sample_;
     AnyHandOverRun<N, M> run_;
+    PaceWatch pace_{options_.t_start, options_.t_end, options_.max_steps};
     static constexpr std::uint64_t most_patience = std::uint64_t{1} << 20;
     [[no_unique_address]] Held held_;
     double longest_step_ = std::numeric_limits<double>::infinity();  // of the event-driven kind

@@ -179,7 +179,10 @@ public:
     }
     bool bounds(double t, const State& w, Reaction& lower, Reaction& upper) const
     {
-        return table_->bounds && table_->bounds(system(), t, w, lower, upper);
+        if (table_->bounds) return table_->bounds(system(), t, w, lower, upper);
+        lower.setZero();
+        upper.setZero();
+        return false;
     }
     [[nodiscard]] double bound(double t, const State& w, Eigen::Index i, Branch side) const
     {

@@ -56,4 +56,32 @@ private:
     double t_ = 0;
 };
 
+/// Whether a run advances so little, over the effort of 20 000 steps without an event, that not
+/// even a hundred times the effort it may make would reach its end.
+class PaceWatch {
+public:
+    PaceWatch(double t, double t_end, std::uint64_t most_effort) noexcept
+        : t_(t),
+          least_((t_end - t) * static_cast<double>(interval) /
+                 (1e2 * static_cast<double>(most_effort)))
+    {
+    }
+
+    /// Called at time t, after that effort and `events` events.
+    [[nodiscard]] bool operator()(double t, std::uint64_t effort, std::uint64_t events) noexcept
+    {
+        if (effort < due_) return false;
+        const bool hopeless = due_ > 0 && events == events_ && t - t_ < least_;
+        due_ = effort + interval;
+        events_ = events;
+        t_ = t;
+        return hopeless;
+    }
+
+private:
+    static constexpr std::uint64_t interval = 20'000;
+    double t_, least_;
+    std::uint64_t due_ = 0, events_ = 0;
+};
+
 }  // namespace ricochet::detail
