@@ -37,8 +37,10 @@ auto run_in(const System& system, const StateOf<System>& w0, const HandOverOptio
     if constexpr (Branching<System>) {
         stepping = {&detail::make_dopri5_loop<N, M>, true};
     }
-    const auto run = detail::make_hand_over<N, M>(inclusion_of<N, M>(system), resized<N>(w0), options, stepping);
-    return detail::resized_run<state_size<System>, reaction_size<System>>(detail::take_run<N, M>(*run));
+    const auto run =
+        detail::make_hand_over<N, M>(inclusion_of<N, M>(system), resized<N>(w0), options, stepping);
+    return detail::resized_run<state_size<System>, reaction_size<System>>(
+        detail::take_run<N, M>(*run));
 }
 
 template <class Run>

@@ -369,12 +369,14 @@ typedef struct rc_statistics {
     uint64_t suppressed; /**< repeats of an event inside its own window */
     uint64_t disabled;   /**< crossings that `enabled` rejected */
     /* Steps without an event, by the evidence for it. */
-    uint64_t proved;    /**< a bound or a polynomial excludes a root */
-    uint64_t checked;   /**< the ends and the extremum inside were examined */
-    uint64_t gated;     /**< a calibrated gate skipped the check */
-    uint64_t assumed;   /**< only the ends were examined */
-    size_t guard;       /**< the guard that ended the run, or RC_NO_GUARD */
-    size_t other_guard; /**< of two conflicting resets the second, or RC_TIME_EVENT_RESET */
+    uint64_t proved;           /**< a bound or a polynomial excludes a root */
+    uint64_t checked;          /**< the ends and the extremum inside were examined */
+    uint64_t gated;            /**< a calibrated gate skipped the check */
+    uint64_t assumed;          /**< only the ends were examined */
+    size_t guard;              /**< the guard that ended the run, or RC_NO_GUARD */
+    size_t other_guard;        /**< of two conflicting resets the second, or RC_TIME_EVENT_RESET */
+    uint64_t unmet_conditions; /**< events whose guard had not left its side in any state found */
+    uint64_t ineffective_resets; /**< events whose reset changed neither the state nor the mode */
 } rc_statistics;
 
 /** Fills in the counts. RC_WRONG_SIZE, RC_BAD_HANDLE, RC_BUSY. */

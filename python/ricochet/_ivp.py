@@ -32,10 +32,10 @@ _OWN_MESSAGES = {
             "nothing stops it; give the event a rest, or end t_span earlier",
     "outside_mode": "a reset left the state behind a unilateral event; let it put the state where "
                     "the event function is zero or positive",
-    "endless_cascade": "resets triggered each other a hundred times at one time; let each leave the "
+    "endless_cascade": "resets trigger each other at one time without an end; let each leave the "
                        "zeros of the other events",
-    "conflicting_resets": "two events happened together and their resets gave one component two "
-                          "values; take a System with reset_set to say what happens then",
+    "conflicting_resets": "two events happened together and the order of their resets matters to "
+                          "a component; take a System with reset_set to say what happens then",
     "step_underflow": "the step became too small without meeting the tolerance; loosen rtol and "
                       "atol",
     "step_limit": "as many steps were taken as max_steps allows; allow more or end t_span earlier",

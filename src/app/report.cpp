@@ -58,6 +58,8 @@ Json json(const Statistics& s)
             {"outside_domain", s.outside_domain},
             {"suppressed", s.suppressed},
             {"disabled", s.disabled},
+            {"unmet_conditions", s.unmet_conditions},
+            {"ineffective_resets", s.ineffective_resets},
             {"evidence",
              {{"proved", s.evidence.proved},
               {"checked", s.evidence.checked},

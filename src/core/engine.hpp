@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -34,6 +35,20 @@
 #include "ricochet/integrate/run.hpp"
 
 namespace ricochet::detail {
+
+/// One of the sets that follow each other at an instant.
+template <class X>
+struct Cascade {
+    X x{};
+    Mode mode = 0;
+    std::vector<std::size_t> fired;
+
+    [[nodiscard]] bool is(const X& other, Mode in, std::span<const std::size_t> set) const
+    {
+        return mode == in && std::equal(fired.begin(), fired.end(), set.begin(), set.end()) &&
+               same_state(x, other);
+    }
+};
 
 /// Converts to `false` as a compile-time constant.
 struct Never {
@@ -65,7 +80,8 @@ protected:
           step_(system_, *setup.kernel, x0, options),
           bank_(system_, BankRules::of(setup.detector, system_), backward_),
           search_(x0, bank_.size(), finders_, resolution_),
-          resets_(x0)
+          resets_(x0),
+          left_rate_(x0)
     {
         const Screening screening = setup.detector.screening;
         on_series_ = step_.has_guard_series() && !defers_ && !predicts_ &&
@@ -223,17 +239,56 @@ protected:
         return resets_any_ && bank_[i].info.resets && bank_[i].turned;
     }
 
+    /// Whether a guard of a set still has its event where another reset has been applied first.
+    struct Stands {
+        EventEngine& engine;
+        double t;
+        bool located;
+
+        [[nodiscard]] bool knows_flow() const noexcept { return engine.system_->flow; }
+        [[nodiscard]] bool enabled(std::size_t i, Mode mode) const
+        {
+            return engine.system_.enabled_in(i, mode);
+        }
+        [[nodiscard]] bool moves(std::size_t i, Mode mode, const X& x) const
+        {
+            return engine.still_moves(i, mode, *this, x);
+        }
+    };
+
     /// Applies the resets of the fired guards to the state before.
-    void transform(bool on_time)
+    /// @param located  the guards have fired inside the step, not at its start
+    void transform(bool on_time, bool located)
     {
         const double t = on_time ? time_event_ : time_of_set();
         resets_.apply(system_, bank_, {search_.fired().span(), on_time, step_.mode(), t},
-                      search_.before());
+                      search_.before(), Stands{*this, t, located});
+    }
+
+    /// Whether guard i moves along the flow of a mode at x in the direction of its event. Nothing
+    /// is known of a guard that jumps.
+    [[nodiscard]] bool still_moves(std::size_t i, Mode mode, const Stands& at, const X& x)
+    {
+        if (!at.knows_flow() || bank_[i].info.boolean) return true;
+        if (at.located && search_.where(i).jump) return true;
+        X rate = x;
+        step_.flow_in(mode, at.t, x, rate);
+        const Side left = at.located ? bank_[i].side : opposite(bank_[i].side);
+        return sign_of(left) * bank_.view(i, mode, calls()).rate(at.t, x, rate, step_.h()) < 0;
     }
 
     /// Whether the event changes nothing, and no host asks for such cuts, so that the step can
     /// stand.
     [[nodiscard]] bool changes_nothing();
+
+    /// Whether a reset that left the state and the mode has changed the flow or a guard, as one
+    /// does that sets a variable outside of the system: at the end of the step, with the same
+    /// arguments, one of them has other bits than before.
+    [[nodiscard]] bool changed_elsewhere();
+
+    /// Whether a reset that has declined, in a system with modes, acts where the guard is strictly
+    /// beyond its surface. One that does not is counted.
+    [[nodiscard]] bool acts_beyond();
 
     /// Whether this event of the guard, not yet counted, ends the run.
     [[nodiscard]] bool ends_run(std::size_t i) const noexcept;
@@ -289,6 +344,10 @@ protected:
     /// @param on_time  with a time event
     void apply(bool located, bool on_time);
 
+    /// Notes what rounding has taken from the components that the resets of the set leave alone,
+    /// bit for bit: it is still due after the event.
+    void note_left_alone(bool located);
+
     void place_set(const Instant& at) noexcept
     {
         set_time_ = at.value;
@@ -339,12 +398,17 @@ protected:
     void settle_all()
     {
         level_ = 0;
+        ++instant_;
         while (settle()) {
         }
     }
 
     /// Fires the guards that were carried across their surfaces.
     [[nodiscard]] bool apply_next_set();
+
+    /// The guard that shows the sets at this instant to be without an end: the set, mode and state
+    /// repeat, or it fires for the thousandth time; `no_guard` if there is none.
+    [[nodiscard]] std::size_t endless_guard();
 
     /// Whether the events of a fired guard accumulate here, so that it comes to rest or the run
     /// ends.
@@ -354,9 +418,10 @@ protected:
     /// not rise above its rounding any more.
     [[nodiscard]] bool fades(std::size_t i);
 
-    /// Rate of guard i after the motion has gone straight on for `ahead` [s].
+    /// Rate of guard i after the motion has gone on for `ahead` [s], by a step of order `order`,
+    /// one or two: with two the third derivative of a guard of the position enters.
     /// @param scale  of differences, as in `SystemTable::rate`
-    [[nodiscard]] double rate_ahead(std::size_t i, double ahead, double scale);
+    [[nodiscard]] double rate_ahead(std::size_t i, double ahead, double scale, int order = 1);
 
     /// How far from its surface the reset has put guard i, positive on the side that it came from.
     [[nodiscard]] double distance_put_back(std::size_t i);
@@ -393,6 +458,20 @@ protected:
                : crossing == Crossing::rising ? Side::below
                                               : else_side;
     }
+
+    /// Whether guard i, on its surface at x⁻ and at x⁺ and about to enter `side`, has its event
+    /// here: the set has changed the mode (or a sign in the state that the guard reads, if it
+    /// belongs to the set), and along the flow that was left it did not move that way. A crossing
+    /// that merely goes on in another mode is the same event.
+    [[nodiscard]] bool leaves_at_once(std::size_t i, Side side);
+    /// Notes that the current set leaves the flow at the start of the step.
+    void leave_from_start()
+    {
+        assign(left_rate_, step_.rate0());
+        left_known_ = true;
+    }
+    /// Whether guard i is so near to its surface at x⁻ and x⁺ that only rounding tells its side.
+    [[nodiscard]] bool stays_within_rounding(std::size_t i);
 
     /// Side that a guard on its surface is about to enter.
     [[nodiscard]] Side heading(std::size_t i);
@@ -455,7 +534,8 @@ protected:
         if (guarded_) bank_.visit(visit);
     }
 
-    static constexpr int most_levels = 100;  ///< largest number of sets at one instant
+    /// Largest number of events of one guard at an instant.
+    static constexpr std::uint32_t most_at_once = 1000;
     static constexpr double stale = std::numeric_limits<double>::quiet_NaN();
     /// Fraction of the last flight of a guard over which a difference quotient is taken: over this
     /// length the rounding of its small excursions is magnified less than over the usual 1e-5 of a
@@ -497,12 +577,19 @@ protected:
     /// a pair, right after each has been written by itself, would stall the processor.
     double set_time_ = 0;
     Mode mode_before_ = 0;
-    bool located_ = false;  ///< the current set lies inside the step, not at its start
-    bool on_time_ = false;  ///< the current set coincides with a time event
+    boost::container::small_vector<std::pair<std::size_t, double>, 8> left_alone_;
+    bool changed_mode_ = false;  ///< by the resets of the current set
+    X left_rate_;                ///< flow at x⁻, of the mode that is left
+    bool left_known_ = false;
+    bool leaves_phase_ = false;  ///< `search_` still holds x⁻, which resets have left
+    bool located_ = false;       ///< the current set lies inside the step, not at its start
+    bool on_time_ = false;       ///< the current set coincides with a time event
     Pending pending_ = Pending::nothing;
     std::size_t stuck_ = no_guard;
     double set_remainder_ = 0;
-    int level_ = 0;  ///< number of sets so far at this instant
+    std::uint64_t level_ = 0;    ///< number of sets so far at this instant
+    std::uint64_t instant_ = 0;  ///< number of instants so far
+    Cascade<X> cascade_;
     Run<X> run_;
     std::string_view who_ = "integrate";  ///< name with which messages of refusal begin
 };

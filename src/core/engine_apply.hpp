@@ -34,10 +34,29 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
         step_.restart(at, search_.before(), step_.mode());
         return;
     }
+    changed_mode_ = resets_.mode() != step_.mode();
+    leaves_phase_ = true;
     step_.restart(at, resets_.after(), resets_.mode());
+    for (const auto& [component, lost] : left_alone_) step_.set_remainder(component, lost);
     if (on_time) step_.hold(t);
     if (stops_) return end(Outcome::stopped_by_event, stopper_);
     pending_ = Pending::settle;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::note_left_alone(bool located)
+{
+    left_alone_.clear();
+    const X& before = search_.before();
+    const X& after = resets_.after();
+    if (before.size() != after.size() || before.size() > 64) return;
+    for (std::size_t c = 0; c < static_cast<std::size_t>(before.size()); ++c) {
+        const auto i = static_cast<decltype(before.size())>(c);
+        // A zero may have been set.
+        if (after[i] != before[i] || after[i] == 0) continue;
+        const double lost = located ? search_.lost_at_set(step_, c) : step_.remainder()[i];
+        if (lost != 0) left_alone_.emplace_back(c, lost);
+    }
 }
 
 template <class X, bool single>
@@ -54,8 +73,10 @@ inline void EventEngine<X, single>::find_band(std::size_t i, double t)
     const double residue = 2 * std::fabs(where.slope) * where.error;
     record.estimated = system_->bounded && !record.info.boolean && std::isfinite(residue) &&
                        search_.at() == where.root && !search_.late();
-    record.band =
-        record.estimated ? std::max(residue, bank_.touch(i, step_.h())) : tolerance_of(i, t);
+    const double g = search_.value_at_set(i);
+    record.band = record.estimated ? std::max(residue, bank_.touch(i, step_.h()))
+                  : g == g         ? std::fabs(g)
+                                   : tolerance_of(i, t);
 }
 
 template <class X, bool single>
@@ -96,7 +117,9 @@ inline void EventEngine<X, single>::apply_time_event()
     bank_.forget_bands();
     search_.fired().clear();
     assign(search_.before(), step_.x0());
-    transform(true);
+    leave_from_start();
+    transform(true, false);
+    note_left_alone(false);
     resting_ =
         resting_ && resets_.mode() == step_.mode() && same_state(resets_.after(), step_.x0());
     apply(false, true);

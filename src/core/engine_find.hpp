@@ -106,9 +106,21 @@ inline bool EventEngine<X, single>::find(bool cleared)
         dismiss_members();
         if (search_.fired().empty()) continue;
         on_time_ = time_event_due_ && search_.at() == step_.h();
+        if (!on_time_ && !search_.meet_conditions(step_, bank_, calls())) {
+            ++run_.statistics.unmet_conditions;
+        }
+        left_known_ = system_->moded;
+        if (left_known_) {
+            assign(left_rate_, search_.before());
+            step_.flow(search_.at(), search_.before(), left_rate_);
+        }
         place_set(step_.instant(search_.at(), search_.at_remainder()));
-        transform(on_time_);
-        if (on_time_ || !changes_nothing()) return true;
+        transform(on_time_, true);
+        if (on_time_ || !changes_nothing() ||
+            (resets_any_ && (changed_elsewhere() || acts_beyond()))) {
+            note_left_alone(true);
+            return true;
+        }
         go_on_past_members();
     }
     note_crossings(step_.h());
@@ -164,6 +176,35 @@ inline bool EventEngine<X, single>::changes_nothing()
         if (bank_[i].info.unilateral || ends_run(i)) return false;
     }
     return same_state(resets_.after(), search_.before());
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::changed_elsewhere()
+{
+    if (step_.is_hosts()) return false;
+    const auto fired = search_.fired().span();
+    const auto resets = [&](std::size_t i) { return bank_[i].info.resets; };
+    if (std::none_of(fired.begin(), fired.end(), resets)) return false;
+    if (!step_.flow_ends_alike(resets_.scratch())) return true;
+    return !bank_.end_alike(step_, calls());
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::acts_beyond()
+{
+    std::uint64_t& count = run_.statistics.ineffective_resets;
+    const auto fired = search_.fired().span();
+    for (const std::size_t i : fired) count += bank_[i].info.resets;
+    const std::size_t i = fired[0];
+    if (!system_->moded || !system_->reset || fired.size() > 1 || !bank_[i].info.resets) {
+        return false;
+    }
+    X& x = resets_.scratch();
+    const double t = search_.go_beyond(step_, bank_, i, x, calls());
+    if (!(t == t)) return false;
+    if (!resets_.ask_again(system_, i, step_.mode(), t, x, search_.before())) return false;
+    --count;
+    return true;
 }
 
 template <class X, bool single>

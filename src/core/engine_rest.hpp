@@ -127,6 +127,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     if (!all_finite(after)) {
         return end(Outcome::non_finite, i);
     }
+    leaves_phase_ = false;
     step_.restart(ahead, 0, after, mode_after);
     for (const std::size_t k : search_.fired()) {
         bank_[k].rated_over = stale;

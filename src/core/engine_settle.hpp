@@ -1,6 +1,8 @@
 // Side on which every guard is armed after a set, and the guards that fire at the same instant.
 #pragma once
 
+#include <bit>
+
 #include "core/engine.hpp"
 
 namespace ricochet::detail {
@@ -29,17 +31,19 @@ inline bool EventEngine<X, single>::settle()
 template <class X, bool single>
 inline bool EventEngine<X, single>::apply_next_set()
 {
-    if (level_++ == most_levels) {
-        end(Outcome::endless_cascade, search_.fired()[0]);
+    if (const std::size_t guard = endless_guard(); guard != no_guard) {
+        end(Outcome::endless_cascade, guard);
         return false;
     }
     search_.begin(step_.x0());
     assign(search_.before(), step_.x0());
     search_.stay_at_start();
     place_set(step_.instant(0, 0));
-    transform(false);
+    leave_from_start();
+    transform(false, false);
     stuck_ = stuck_guard();
     if (stuck_ == no_guard) {
+        note_left_alone(false);
         apply(false, false);
         return !ended_;
     }
@@ -53,6 +57,27 @@ inline bool EventEngine<X, single>::apply_next_set()
     search_.fired().push_back(stuck_);
     pending_ = resting_ ? Pending::hold : Pending::arm_stuck;
     return true;
+}
+
+template <class X, bool single>
+inline std::size_t EventEngine<X, single>::endless_guard()
+{
+    const std::span<const std::size_t> fired = search_.fired().span();
+    for (const std::size_t i : fired) {
+        GuardRecord& record = bank_[i];
+        record.at_once =
+            std::exchange(record.instant, instant_) == instant_ ? record.at_once + 1 : 1;
+        if (record.at_once == most_at_once) return i;
+    }
+    // A loop of any length is met where a set is compared with the last one whose number is a power
+    // of two.
+    if (level_ > 0 && cascade_.is(step_.x0(), step_.mode(), fired)) return fired[0];
+    if (std::has_single_bit(++level_)) {
+        cascade_.x = step_.x0();
+        cascade_.mode = step_.mode();
+        cascade_.fired.assign(fired.begin(), fired.end());
+    }
+    return no_guard;
 }
 
 template <class X, bool single>
@@ -157,9 +182,19 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
     const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
     const bool rounded = std::fabs(g) > band && is_flipped_by_rounding(i, before);
     if (rounded) record.band = std::fabs(g);
-    const bool on_surface = rounded || std::fabs(g) <= band;
+    bool on_surface = rounded || std::fabs(g) <= band;
+    Side side = on_surface ? heading(i) : side_of(g);
+    bool leaves = on_surface && leaves_at_once(i, side);
+    if (!on_surface && changed_mode_ && stays_within_rounding(i)) {
+        const Side head = heading(i);
+        leaves = leaves_at_once(i, head);
+        if (leaves) {
+            record.band = std::fabs(g);
+            on_surface = true;
+            side = head;
+        }
+    }
     record.departs = on_surface || record.fired || record.newly_enabled;
-    const Side side = on_surface ? heading(i) : side_of(g);
     bank_.arm(i, side);
     record.from = 0;
     if (side == Side::plateau) {
@@ -178,7 +213,8 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
     const Side at_set = located_ ? opposite(before) : before;
     const bool carried_back = !(resets_any_ && record.info.resets) && !on_surface &&
                               side == opposite(at_set) && counts(at_set, record.info.crossing);
-    const bool fires = record.fired           ? pressed || carried_back
+    const bool fires = leaves                 ? true
+                       : record.fired         ? pressed || carried_back
                        : record.newly_enabled ? record.acting && (arrived || pressed)
                                               : flipped;
     if (fires && counts_here(i)) {
@@ -192,6 +228,53 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
     const bool outside = kept_out && !on_surface && g < 0 && is_new;
     if (outside) end(Outcome::outside_mode, i);
     return !outside;
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
+{
+    const GuardRecord& record = bank_[i];
+    if (!leaves_phase_ || !record.acting || record.newly_enabled || side == Side::plateau) {
+        return false;
+    }
+    if (record.info.boolean || record.info.crossing == Crossing::either) return false;
+    if (!counts(opposite(side), record.info.crossing)) return false;
+    if (!changed_mode_ && !(record.fired && resets_any_ && record.info.resets)) return false;
+    const X& left = search_.before();
+    if (left.size() != step_.x0().size()) return false;
+    const double t = step_.time(0);
+    if (!left_known_) {
+        assign(left_rate_, left);
+        step_.flow_in(mode_before_, t, left, left_rate_);
+    }
+    left_known_ = true;
+    const auto guard = bank_.view(i, step_.mode(), calls());
+    const double moved = guard.rate(t, step_.x0(), left_rate_, h_next_);
+    // Along the flow that was left it stood, or moved the other way, by more than rounding.
+    const double noise = 64 * std::numeric_limits<double>::epsilon() *
+                         std::fabs(bank_.complete_rate0(i, step_, h_next_, calls()));
+    if (sign_of(side) * moved > noise) return false;
+    if (sign_of(side) * moved >= -noise) {  // a vanishing rate has the sign that it has later
+        const double ahead = 1e-6 * h_next_;
+        X later = step_.x0();
+        X rate = left_rate_;
+        move(later, left, ahead, left_rate_);
+        step_.flow_in(mode_before_, step_.time(ahead), later, rate);
+        if (sign_of(side) * guard.rate(t, step_.x0(), rate, h_next_) > noise) return false;
+    }
+    return record.fired || std::fabs(guard.value(t, left)) <= rounding_of(i, t, left);
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::stays_within_rounding(std::size_t i)
+{
+    const GuardRecord& record = bank_[i];
+    if (!record.acting || record.fired || record.newly_enabled || record.info.boolean) return false;
+    const double g = std::fabs(bank_.g0(i));
+    const double rate = bank_.complete_rate0(i, step_, h_next_, calls());
+    const double moves = std::fabs(rate) * (std::fabs(step_.time(0)) + h_next_);
+    if (!(g <= 0x1p-20 * std::max(bank_.armed_scale(i, h_next_), moves))) return false;
+    return g <= rounding_of(i);
 }
 
 template <class X, bool single>
@@ -246,13 +329,16 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
         if (!bank_[i].fired) noise = std::max(noise, rounding_of(i) / (1e-5 * h_next_));
     }
     if (std::fabs(rate) > noise) return side_of(rate);
-    const Side side = std::fabs(next) > noise ? side_of(next) : Side::plateau;
+    // A guard of the position whose force is zero, too, leaves by its jerk.
+    const double later = step_.is_hosts() ? next : rate_ahead(i, delta, h_next_, 2);
+    const Side side = std::fabs(later) > noise ? side_of(later) : Side::plateau;
     bank_.set_rate0(i, sign_of(side) * std::numeric_limits<double>::min());
     return side;
 }
 
 template <class X, bool single>
-inline double EventEngine<X, single>::rate_ahead(std::size_t i, double ahead, double scale)
+inline double EventEngine<X, single>::rate_ahead(std::size_t i, double ahead, double scale,
+                                                 int order)
 {
     X& later = resets_.after();
     X& rate_later = resets_.scratch();
@@ -260,6 +346,11 @@ inline double EventEngine<X, single>::rate_ahead(std::size_t i, double ahead, do
     assign(rate_later, step_.x0());
     move(later, step_.x0(), ahead, step_.rate0());
     step_.flow(ahead, later, rate_later);
+    if (order == 2) {  // Heun's step
+        move(later, step_.x0(), ahead / 2, step_.rate0());
+        move(later, later, ahead / 2, rate_later);
+        step_.flow(ahead, later, rate_later);
+    }
     return bank_.view(i, step_.mode(), calls()).rate(step_.time(ahead), later, rate_later, scale);
 }
 

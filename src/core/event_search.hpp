@@ -43,6 +43,7 @@ public:
           space_(like),
           before_(like),
           rate_(like),
+          lost_(like),
           hits_(guards),
           fired_(guards),
           resolution_(resolution),
@@ -92,7 +93,11 @@ public:
     [[nodiscard]] X& before() noexcept { return before_; }
 
     /// Places the next set at the start of the step.
-    void stay_at_start() noexcept { at_ = at_remainder_ = 0; }
+    void stay_at_start() noexcept
+    {
+        at_ = at_remainder_ = 0;
+        rated_at_set_ = values_known_ = false;
+    }
     [[nodiscard]] const Location& where(std::size_t guard) noexcept
     {
         for (Hit& hit : hits_) {
@@ -118,7 +123,7 @@ public:
         hits_.clear();
         fired_.clear();
         evidence_ = finders_->detector.evidence;
-        late_ = rated_at_set_ = false;
+        late_ = rated_at_set_ = values_known_ = straight_in_space_ = has_lost_ = false;
         std::size_t suspects = 0;
         std::size_t last = 0;
         for (const std::size_t i : bank.suspects()) {
@@ -140,6 +145,12 @@ public:
         settle_place(step, time_event_due);
         return true;
     }
+
+    /// Moves the set along the flow to the first place at which every guard of it has left its side
+    /// in floating point, so that a reset that asks for the condition of its event finds it true:
+    /// to the root predicted by the slopes of those that have not, at most as far as the bracket
+    /// within which they were located. False: nowhere, and nothing is moved.
+    bool meet_conditions(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
 
     /// Adds the crossings and touches of a recorded guard, up to the sample `end`.
     void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
@@ -190,6 +201,40 @@ public:
         return sample;
     }
 
+    /// A state on the line along the flow through the set at which guard i is strictly beyond its
+    /// surface, at most 4 ulp of the time past its bracket; returns its time, NaN if there is none.
+    [[nodiscard]] double go_beyond(const CurrentStep& step, Bank& bank, std::size_t i, X& x,
+                                   std::uint64_t& calls);
+
+    /// What rounding has taken from component c of the state at the set, where it is known.
+    [[nodiscard]] double lost_at_set(const CurrentStep& step, std::size_t c) const noexcept
+    {
+        const auto i = static_cast<decltype(before_.size())>(c);
+        if (has_lost_) return lost_[i];
+        if (!straight_in_space_) return at_remainder_ == 0 ? step.lost_at(at_, c) : 0;
+        return lost_from(step, straight_from_, space_.x, space_.dxdt, c);
+    }
+
+    /// The guard at the set, where `meet_conditions` has evaluated it; else NaN.
+    [[nodiscard]] double value_at_set(std::size_t i) const noexcept
+    {
+        for (const Hit& hit : hits_) {
+            if (hit.guard == i && values_known_) return hit.value;
+        }
+        return std::numeric_limits<double>::quiet_NaN();
+    }
+
+    /// Keeps the flow at the set, or where the motion is straight until there.
+    void keep_rate(const CurrentStep& step)
+    {
+        if (rated_at_set_) {
+        } else if (straight_in_space_) {
+            assign(rate_, space_.dxdt);
+        } else {
+            step.flow(at_, before_, rate_);
+        }
+        rated_at_set_ = true;
+    }
     /// Whether guard i is a candidate that was still so far from its surface at the end of the
     /// window that its event is another one.
     [[nodiscard]] bool comes_later(const CurrentStep& step, const Bank& bank,
@@ -257,7 +302,7 @@ private:
     {
         if (space_.x.size() != like.size()) {
             space_ = ProbeSpace<X>(like);
-            before_ = rate_ = like;
+            before_ = rate_ = lost_ = like;
         }
     }
 
@@ -553,7 +598,16 @@ private:
         first_ = &hit;
         assign(before_, hit.finding.late ? step.x0() : probe.state_at(hit.where));
         goes_straight_ = probe.is_settled() && !hit.where.jump;
-        if (goes_straight_) assign(rate_, space_.dxdt);
+        if (!goes_straight_) return;
+        assign(rate_, space_.dxdt);
+        if (before_.size() > 64) return;
+        at_ = hit.where.root;
+        at_remainder_ = hit.where.root_remainder;
+        has_lost_ = true;
+        for (std::size_t c = 0; c < static_cast<std::size_t>(before_.size()); ++c) {
+            lost_[static_cast<decltype(before_.size())>(c)] =
+                lost_from(step, probe.placed(), space_.x, rate_, c);
+        }
     }
 
     /// First set if guard i is the only one that needs a check. The code that nearly
@@ -574,6 +628,7 @@ private:
                 std::max(resolution_.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
             const Location where = finders_->locate(probe, start, end, tolerance);
             keep_only(i, side, where, probe.state_at(where));
+            keep_line(probe, where);
             return true;
         }
         return find_only_carefully(step, bank, i, calls);
@@ -601,9 +656,17 @@ private:
                 continue;
             }
             keep_only(i, finding.side, *where, finding.late ? step.x0() : probe.state_at(*where));
+            if (!finding.late) keep_line(probe, *where);
             return true;
         }
         return false;
+    }
+
+    /// Remembers that the set lies on the line in the work space.
+    void keep_line(const Probe& probe, const Location& where) noexcept
+    {
+        straight_in_space_ = probe.is_settled() && !where.jump;
+        straight_from_ = probe.placed();
     }
 
     void keep_only(std::size_t i, Side side, const Location& where, const X& before)
@@ -615,6 +678,7 @@ private:
         hit.guard = i;
         hit.side = side;
         hit.where = where;
+        hit.located = true;
         fired_.push_back(i);
     }
 
@@ -634,17 +698,38 @@ private:
 
     [[nodiscard]] double window_end(const CurrentStep& step) noexcept;
 
+    /// The longest time [s] after which a guard of the set that has not left its side at the state
+    /// x reaches its surface there, `ahead` after the set; 0 if there is none, NaN if it cannot be
+    /// told.
+    [[nodiscard]] double lacks(const CurrentStep& step, Bank& bank, const X& x, double ahead,
+                               std::uint64_t& calls);
+
     /// The set happens at its latest root, or at the time event that it belongs to.
     void settle_place(const CurrentStep& step, bool time_event_due);
+
+    /// What rounding has taken from component c of the state at the set, which lies on the line
+    /// from a repeat of the step at the offset `from`.
+    [[nodiscard]] double lost_from(const CurrentStep& step, double from, const X& x, const X& rate,
+                                   std::size_t c) const noexcept
+    {
+        const auto i = static_cast<decltype(x.size())>(c);
+        const double ahead = (at_ - from) + at_remainder_;
+        return step.lost_at(from, c) + ((x[i] - before_[i]) + ahead * rate[i]);
+    }
 
     const Finders<X>* finders_;
     ProbeSpace<X> space_;
     X before_;
     X rate_;
+    X lost_;  ///< see `lost_at_set`
     GuardList<Hit, single> hits_;
-    const Hit* first_ = nullptr;  ///< of several candidates; `before_` is the state at its root
-    bool goes_straight_ = false;  ///< and `rate_` the flow there
-    bool rated_at_set_ = false;   ///< `rate_` is the flow at the set
+    const Hit* first_ = nullptr;      ///< of several candidates; `before_` is the state at its root
+    bool goes_straight_ = false;      ///< and `rate_` the flow there
+    bool rated_at_set_ = false;       ///< `rate_` is the flow at the set
+    bool straight_in_space_ = false;  ///< as is, for a while, the rate in the work space
+    double straight_from_ = 0;        ///< [s] offset of the state there
+    bool has_lost_ = false;
+    bool values_known_ = false;  ///< hits hold the guards at the set
     GuardList<std::size_t, single> fired_;
     std::vector<Note> notes_;
     std::vector<X> states_;  ///< of notes

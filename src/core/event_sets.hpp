@@ -94,6 +94,7 @@ template <class X, bool single>
 inline void EventSearch<X, single>::settle_place(const CurrentStep& step, bool time_event_due)
 {
     if (fired_.size() > 1) {
+        has_lost_ = false;
         at_ = 0;
         for (const Hit& hit : hits_) {
             if (hit.located && std::find(fired_.begin(), fired_.end(), hit.guard) != fired_.end()) {
@@ -110,9 +111,105 @@ inline void EventSearch<X, single>::settle_place(const CurrentStep& step, bool t
     if (time_event_due && at_ + resolution_.window(step.time(at_)) >= step.h()) {
         at_ = step.h();
         at_remainder_ = 0;
-        rated_at_set_ = false;
+        rated_at_set_ = straight_in_space_ = has_lost_ = false;
         assign(before_, step.x1());
     }
+}
+
+template <class X, bool single>
+inline double EventSearch<X, single>::lacks(const CurrentStep& step, Bank& bank, const X& x,
+                                            double ahead, std::uint64_t& calls)
+{
+    const double t = step.instant(at_, at_remainder_ + ahead).value;
+    double longest = 0;
+    for (const std::size_t i : fired_) {
+        for (Hit& hit : hits_) {
+            if (hit.guard != i || hit.where.jump) continue;
+            // A member that the window has put together with later ones may have turned back.
+            const bool last = at_ - hit.where.root <= resolution_.blur(t);
+            hit.value = bank.view(i, step.mode(), calls).value(t, x);
+            if (has_left(hit.side, hit.value) || !last) continue;
+            const double wait = std::fabs(hit.value / hit.where.slope);
+            longest = wait > longest || wait != wait ? wait : longest;
+        }
+    }
+    return longest;
+}
+
+template <class X, bool single>
+inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Bank& bank,
+                                                    std::uint64_t& calls)
+{
+    if (late_) return true;
+    double wait = lacks(step, bank, before_, 0, calls);
+    values_known_ = wait == 0;
+    if (values_known_) return true;
+    double far = at_;
+    for (const Hit& hit : hits_) {
+        if (hit.located) far = std::max(far, hit.where.hi);
+    }
+    far = std::min(far, step.h());
+    const double room = (far - at_) - at_remainder_;
+    const bool straight = straight_in_space_;
+    keep_rate(step);
+    X& x = space_.root;
+    const auto holds = [&](double ahead) {
+        values_known_ = all_finite(x) && lacks(step, bank, x, ahead, calls) == 0;
+        if (!values_known_) return false;
+        const TwoSum at = two_sum(at_, at_remainder_ + ahead);
+        at_ = at.value;
+        at_remainder_ = at.remainder;
+        if (has_lost_) {
+            for (std::size_t c = 0; c < static_cast<std::size_t>(x.size()); ++c) {
+                const auto i = static_cast<decltype(x.size())>(c);
+                lost_[i] += (before_[i] - x[i]) + ahead * rate_[i];
+            }
+        }
+        assign(before_, x);
+        return true;
+    };
+    for (int k = 0; k <= 8 && wait > 0 && wait < room; ++k, wait *= 2) {
+        move(x, before_, wait, rate_);
+        if (holds(wait)) return true;
+    }
+    if (room >= 0) {
+        // The end of the bracket, as the locator has evaluated it.
+        if (straight) {
+            move(x, space_.x, far - straight_from_, rate_);
+        } else {
+            step.restep(far, x);
+        }
+        if (holds(room)) return true;
+    }
+    // Rounding may hide it there, too.
+    const double finest = finest_bracket(at_, step.h());
+    for (double beyond = finest; beyond <= 8 * finest; beyond *= 2) {
+        const double ahead = std::max(room, 0.0) + beyond;
+        if (at_ + at_remainder_ + ahead > step.h()) return false;
+        move(x, before_, ahead, rate_);
+        if (holds(ahead)) return true;
+    }
+    return false;
+}
+
+template <class X, bool single>
+double EventSearch<X, single>::go_beyond(const CurrentStep& step, Bank& bank, std::size_t i, X& x,
+                                         std::uint64_t& calls)
+{
+    const double t0 = step.time(at_);
+    const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(t0);
+    const Location& place = where(i);
+    const double most =
+        std::max(place.hi - at_, 0.0) + std::max(ulps, finest_bracket(at_, step.h()));
+    const double sign = sign_of(side_left(i));
+    keep_rate(step);
+    for (double ahead = most / 256; ahead <= most; ahead *= 2) {
+        move(x, before_, ahead, rate_);
+        const double t = step.instant(at_, at_remainder_ + ahead).value;
+        const double g = bank.view(i, step.mode(), calls).value(t, x);
+        if (sign * g < 0) return t;
+    }
+    return std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace ricochet::detail

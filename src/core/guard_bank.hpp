@@ -115,6 +115,18 @@ public:
         forget_screening();
     }
 
+    /// Whether the guards, evaluated again at the end of the step, have the values that they had
+    /// there before. Those whose checks are deferred are left alone.
+    [[nodiscard]] bool end_alike(const Step<X>& step, std::uint64_t& calls)
+    {
+        const double t = step.time(step.h());
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (records_[i].deferred || !records_[i].enabled || std::isnan(g1_[i])) continue;
+            if (view(i, step.mode(), calls).value(t, step.x1()) != g1_[i]) return false;
+        }
+        return true;
+    }
+
     /// As `sample_end`, without rates.
     void sample_values_at_end(const Step<X>& step, std::uint64_t& calls)
     {

@@ -90,6 +90,8 @@ struct GuardRecord {
     Side last_side = Side::plateau;                          ///< the side it left then
     bool returned = false;  ///< it has come back to that side from the other one
     ShrinkingIntervals intervals;
+    std::uint64_t instant = 0;  ///< the last at which it fired at the start of a step
+    std::uint32_t at_once = 0;  ///< how often it did so then
 };
 
 [[nodiscard]] constexpr double sign_of(Side side) noexcept

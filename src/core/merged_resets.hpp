@@ -1,11 +1,23 @@
 // The resets of guards that fired together, applied to one state.
 //
 // The reset of a single guard changes the state in place. Several resets all read the state
-// before, and their changes are merged: two resets that give one component, or the mode, different
-// values are in conflict, unless the system takes the whole set.
+// before. Those that change different components are merged. Those that change a common component,
+// or the mode, are applied one after the other in every order, where a guard whose event an earlier
+// reset has undone is left out:
+//
+//     r_i = R_i(x⁻)      G = the members that share a component     C = the components they change
+//     for every order of G:   x = x⁻;  for i in the order:  if i still has its event:  x = R_i(x)
+//     a component of C   is x⁻ plus all increments where each member adds the same in every place,
+//                        else its value at the end of all orders where that is one value,
+//                        else in conflict
+//
+// A system may take the whole set instead (`SystemTable::reset_set`).
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -30,47 +42,60 @@ class MergedResets {
 public:
     explicit MergedResets(const X& like) : after_(like), single_(like) {}
 
-    /// Applies the resets of the guards that fired, which all read the state `before`, and the
-    /// reset of a time event. `bank` knows which guards have a reset.
-    template <class Bank>
-    void apply(const SystemAt<X>& system, const Bank& bank, const FiredSet& set, const X& before)
+    /// Applies the resets of the guards that fired to the state `before`, and the reset of a time
+    /// event. `bank` knows which guards have a reset.
+    /// @param stands  whether guard i still has its event in a mode and a state
+    template <class Bank, class Stands>
+    void apply(const SystemAt<X>& system, const Bank& bank, const FiredSet& set, const X& before,
+               const Stands& stands)
     {
         const auto& [fired, on_time, mode, t] = set;
         assign(after_, before);
         mode_ = mode;
         conflict_ = {no_guard, no_guard};
-        if (fired.size() > 1 || on_time) {
-            mode_writer_ = resizer_ = no_guard;
-            writers_.assign(static_cast<std::size_t>(before.size()), no_guard);
+        if (fired.size() == 1 && !on_time && !system->reset_set) {
+            const std::size_t i = fired[0];
+            if (!system->reset || !bank[i].info.resets) return;
+            mode_ = system->reset(system.door(), i, mode, t, after_);
+            return;
         }
-        if (system->reset_set) {
-            std::size_t resetting = 0;
-            for (const std::size_t i : fired) resetting += bank[i].info.resets;
-            if (resetting > 0) {
-                mode_ =
-                    system->reset_set(system.door(), FiredGuards(fired, on_time), mode, t, after_);
-                return;
-            }
-        } else if (system->reset) {
-            if (fired.size() == 1 && !on_time) {
-                const std::size_t i = fired[0];
-                if (bank[i].info.resets) mode_ = system->reset(system.door(), i, mode, t, after_);
-                return;
-            }
-            for (const std::size_t i : fired) {
-                if (!bank[i].info.resets) continue;
-                assign(single_, before);
-                merge(i, system->reset(system.door(), i, mode, t, single_), mode, before);
-            }
+        members_.clear();
+        for (const std::size_t i : fired) {
+            if (system->resets() && bank[i].info.resets) members_.push_back({.who = i});
         }
-        if (!on_time || !system->timed()) return;
-        if (fired.empty()) {
-            mode_ = system->time_reset(system.door(), mode, t, after_);
-        } else {
-            assign(single_, before);
-            merge(time_event_reset, system->time_reset(system.door(), mode, t, single_), mode,
-                  before);
+        if (system->reset_set && !members_.empty()) {
+            mode_ = system->reset_set(system.door(), FiredGuards(fired, on_time), mode, t, after_);
+            return;
         }
+        if (on_time && system->timed()) members_.push_back({.who = time_event_reset});
+        const auto reset = [&](const Member& member, Mode in, X& x) {
+            return member.who == time_event_reset
+                       ? system->time_reset(system.door(), in, t, x)
+                       : system->reset(system.door(), member.who, in, t, x);
+        };
+        if (members_.size() == 1) {
+            mode_ = reset(members_[0], mode, after_);
+        } else if (!members_.empty()) {
+            apply_together(before, mode, reset, stands);
+        }
+    }
+
+    /// Applies the reset of guard i, which has left the state `before`, to the state x. Components
+    /// that it leaves alone keep their values before. Whether it changes anything.
+    [[nodiscard]] bool ask_again(const SystemAt<X>& system, std::size_t i, Mode mode, double t,
+                                 X& x, const X& before)
+    {
+        const X from = x;
+        mode_ = system->reset(system.door(), i, mode, t, x);
+        if (x.size() != from.size()) {
+            assign(after_, x);
+            return true;
+        }
+        assign(after_, before);
+        for (std::size_t c = 0; c < size_of(from); ++c) {
+            if (differs(x, from, c)) at(after_, c) = at(x, c);
+        }
+        return mode_ != mode || !same_state(after_, before);
     }
 
     [[nodiscard]] X& after() noexcept { return after_; }
@@ -86,47 +111,327 @@ public:
     }
 
 private:
-    /// Merges the result of one reset, in `single_`, into `after_`.
-    void merge(std::size_t writer, Mode mode_after, Mode mode, const X& before)
+    struct Range {
+        double least = std::numeric_limits<double>::infinity();
+        double most = -std::numeric_limits<double>::infinity();
+
+        void add(double value) noexcept
+        {
+            if (value < least || value != value) least = value;
+            if (value > most || value != value) most = value;
+        }
+        /// Whether all values are the same to within `rounding`; NaN is the same as nothing.
+        [[nodiscard]] bool is_one(double rounding) const noexcept
+        {
+            return most - least <= rounding;
+        }
+    };
+
+    struct Member {
+        std::size_t who;  ///< a guard, or `time_event_reset`
+        Mode mode = 0;    ///< after its reset of the state before
+        X result{};       ///< the state after that
+        bool shares = false;
+        double rounding = 0;  ///< of the components that it changes
+        std::vector<Range> increments{};
+
+        [[nodiscard]] bool changes(const X& before, Mode from) const
+        {
+            return mode != from || !same_state(result, before);
+        }
+    };
+
+    template <class Reset, class Stands>
+    void apply_together(const X& before, Mode mode, const Reset& reset, const Stands& stands)
     {
-        const auto claim = [&](std::size_t& owner, bool same) {
-            if (owner != no_guard && !same) conflict_ = {owner, writer};
-            owner = writer;
-        };
-        if (mode_after != mode) {
-            claim(mode_writer_, mode_after == mode_);
-            mode_ = mode_after;
+        bool resized = false;
+        for (Member& member : members_) {
+            member.result = before;
+            member.mode = reset(member, mode, member.result);
+            resized = resized || member.result.size() != before.size();
         }
-        if (resizer_ != no_guard || single_.size() != before.size()) {
-            return merge_resized(writer, before);
+        if (resized) return merge_resized(before, mode);
+        if (find_shared(before, mode)) {
+            if (!stands.knows_flow() && agree(before, mode)) return merge(before, mode);
+        } else {
+            merge(before, mode);
+            if (!undo_one_another(before, mode, reset)) return;
+            assign(after_, before);
+            mode_ = mode;
         }
-        for_each_component(before, [&](auto c) {
-            if (single_[c] == before[c]) return;
-            claim(writers_[static_cast<std::size_t>(c)], single_[c] == after_[c]);
-            after_[c] = single_[c];
-        });
+        merge(before, mode);
+        apply_in_every_order(before, mode, reset, stands);
     }
 
-    /// Merges a reset that changes the dimension of the state. It writes all components, and is in
-    /// conflict with any other reset that writes, unless they agree.
-    void merge_resized(std::size_t writer, const X& before)
+    /// A reset that changes the dimension of the state writes all components, and is in conflict
+    /// with any other reset that changes anything, unless they agree.
+    void merge_resized(const X& before, Mode mode)
     {
-        if (same_state(single_, before)) return;
-        for (const std::size_t owner : writers_) {
-            if (owner != no_guard) conflict_ = {owner, writer};
+        const Member* first = nullptr;
+        for (const Member& member : members_) {
+            if (!member.changes(before, mode)) continue;
+            if (!first) {
+                first = &member;
+                assign(after_, member.result);
+                mode_ = member.mode;
+            } else if (member.mode != mode_ || !same_state(member.result, after_)) {
+                conflict_ = {first->who, member.who};
+            }
         }
-        if (resizer_ != no_guard && !same_state(single_, after_)) conflict_ = {resizer_, writer};
-        resizer_ = writer;
-        assign(after_, single_);
+    }
+
+    /// Marks the members that change a common component, or give different modes.
+    bool find_shared(const X& before, Mode mode)
+    {
+        bool any = false;
+        const auto share = [&](auto&& changes) {
+            const auto count = std::count_if(members_.begin(), members_.end(), changes);
+            if (count < 2) return;
+            any = true;
+            for (Member& member : members_) member.shares = member.shares || changes(member);
+        };
+        for (std::size_t c = 0; c < size_of(before); ++c) {
+            share([&](const Member& member) { return differs(member.result, before, c); });
+        }
+        Mode next = mode;
+        bool several = false;
+        for (const Member& member : members_) {
+            if (member.mode == mode) continue;
+            several = several || (next != mode && member.mode != next);
+            next = member.mode;
+        }
+        if (several) share([&](const Member& member) { return member.mode != mode; });
+        return any;
+    }
+
+    /// Whether all that change a component give it one value: what is left to ask where the flow is
+    /// a host's. They share nothing then.
+    [[nodiscard]] bool agree(const X& before, Mode mode)
+    {
+        for (const Member& one : members_) {
+            for (const Member& other : members_) {
+                if (one.mode != mode && other.mode != mode && one.mode != other.mode) return false;
+                for (std::size_t c = 0; c < size_of(before); ++c) {
+                    const bool both =
+                        differs(one.result, before, c) && differs(other.result, before, c);
+                    if (both && differs(one.result, other.result, c)) return false;
+                }
+            }
+        }
+        for (Member& member : members_) member.shares = false;
+        return true;
+    }
+
+    /// Marks members of which one sets a component of the other back to its value before: it
+    /// changes nothing there when it is asked alone.
+    template <class Reset>
+    [[nodiscard]] bool undo_one_another(const X& before, Mode mode, const Reset& reset)
+    {
+        const auto changing =
+            std::count_if(members_.begin(), members_.end(),
+                          [&](const Member& member) { return !same_state(member.result, before); });
+        if (changing < 1 || members_.size() < 2) return false;
+        bool any = false;
+        for (Member& member : members_) {
+            assign(single_, after_);
+            reset(member, mode, single_);
+            for (std::size_t c = 0; c < size_of(before); ++c) {
+                const bool of_another =
+                    differs(after_, before, c) && !differs(member.result, before, c);
+                if (!of_another || at(single_, c) != at(before, c)) continue;
+                any = member.shares = true;
+                for (Member& other : members_) {
+                    other.shares = other.shares || differs(other.result, before, c);
+                }
+            }
+        }
+        return any;
+    }
+
+    /// The changes of the members that share nothing, and one mode for all.
+    void merge(const X& before, Mode mode)
+    {
+        for (const Member& member : members_) {
+            if (member.mode != mode) mode_ = member.mode;
+            if (member.shares) continue;
+            for (std::size_t c = 0; c < size_of(before); ++c) {
+                if (differs(member.result, before, c)) at(after_, c) = at(member.result, c);
+            }
+        }
+    }
+
+    template <class Reset, class Stands>
+    void apply_in_every_order(const X& before, Mode mode, const Reset& reset, const Stands& stands)
+    {
+        group_.clear();
+        for (std::size_t k = 0; k < members_.size(); ++k) {
+            if (!members_[k].shares) continue;
+            group_.push_back(k);
+            members_[k].increments.assign(size_of(before), {});
+            note_rounding(members_[k], before);
+        }
+        ends_.assign(size_of(before), {});
+        first_mode_ = last_mode_ = mode;
+        modes_differ_ = false;
+        orders_ = 0;
+        const auto take = [&](std::span<const std::size_t> order) {
+            take_in_order(order, before, mode, reset, stands);
+        };
+        constexpr std::size_t most = 4;
+        if (group_.size() <= most) {
+            do {
+                take(group_);
+            } while (std::next_permutation(group_.begin(), group_.end()));
+        } else {
+            take(group_);
+            std::reverse(group_.begin(), group_.end());
+            take(group_);
+            std::reverse(group_.begin(), group_.end());
+        }
+        const bool additive = settle(before);
+        const bool asks_pairs = conflict_.first != no_guard || (group_.size() > most && !additive);
+        if (asks_pairs) name_pair(before, mode, reset, stands);
+    }
+
+    /// Applies the group in one order, and adds what each member adds and where it ends.
+    template <class Reset, class Stands>
+    void take_in_order(std::span<const std::size_t> order, const X& before, Mode mode,
+                       const Reset& reset, const Stands& stands)
+    {
+        X x = before;
+        Mode in = mode;
+        for (const std::size_t k : order) {
+            Member& member = members_[k];
+            const bool timed = member.who == time_event_reset;
+            if (!timed && !stands.enabled(member.who, in)) continue;
+            assign(single_, x);
+            const Mode next = reset(member, in, single_);
+            for (std::size_t c = 0; c < size_of(before); ++c) {
+                member.increments[c].add(at(single_, c) - at(x, c));
+            }
+            if (k != order.front() && !timed && !stands.moves(member.who, in, x)) continue;
+            assign(x, single_);
+            in = next;
+        }
+        for (std::size_t c = 0; c < size_of(before); ++c) ends_[c].add(at(x, c));
+        modes_differ_ = modes_differ_ || (orders_ > 0 && in != last_mode_);
+        last_mode_ = in;
+        ++orders_;
+    }
+
+    /// Gives the components of the group their values, or notes a conflict. Returns whether each
+    /// member adds the same in every place, to every component.
+    bool settle(const X& before)
+    {
+        bool additive = true;
+        double rounding = 0;
+        for (const std::size_t k : group_) rounding = std::max(rounding, members_[k].rounding);
+        for (std::size_t c = 0; c < size_of(before); ++c) {
+            bool each_is_one = true;
+            std::vector<double> sum;
+            for (const std::size_t k : group_) {
+                const Range& added = members_[k].increments[c];
+                if (added.most < added.least) continue;
+                each_is_one = each_is_one && added.is_one(members_[k].rounding);
+                sum.push_back(added.least);
+            }
+            if (each_is_one) {
+                // In an order of their own, so that the declared one does not matter.
+                std::sort(sum.begin(), sum.end());
+                double value = at(before, c);
+                for (const double added : sum) value += added;
+                if (std::any_of(sum.begin(), sum.end(), [](double d) { return d != 0; })) {
+                    at(after_, c) = value;
+                }
+                continue;
+            }
+            additive = false;
+            if (ends_[c].is_one(rounding)) {
+                at(after_, c) = ends_[c].least;
+            } else {
+                note_conflict();
+            }
+        }
+        if (modes_differ_) note_conflict();
+        if (last_mode_ != first_mode_) mode_ = last_mode_;
+        return additive && !modes_differ_;
+    }
+
+    void note_conflict()
+    {
+        if (conflict_.first != no_guard) return;
+        conflict_ = {members_[group_[0]].who, members_[group_[1]].who};
+    }
+
+    /// Names the first two members whose order matters.
+    template <class Reset, class Stands>
+    void name_pair(const X& before, Mode mode, const Reset& reset, const Stands& stands)
+    {
+        const auto end_of = [&](std::size_t first, std::size_t second, X& x) {
+            ends_.assign(size_of(before), {});
+            const std::size_t order[] = {first, second};
+            take_in_order(order, before, mode, reset, stands);
+            for (std::size_t c = 0; c < size_of(before); ++c) at(x, c) = ends_[c].least;
+            return last_mode_;
+        };
+        const Mode merged = mode_;
+        X one = before, other = before;
+        for (std::size_t i = 0; i < group_.size(); ++i) {
+            for (std::size_t j = i + 1; j < group_.size(); ++j) {
+                const Mode a = end_of(group_[i], group_[j], one);
+                const Mode b = end_of(group_[j], group_[i], other);
+                const double rounding =
+                    std::max(members_[group_[i]].rounding, members_[group_[j]].rounding);
+                bool same = a == b;
+                for (std::size_t c = 0; c < size_of(before); ++c) {
+                    same = same && std::fabs(at(one, c) - at(other, c)) <= rounding;
+                }
+                if (same) continue;
+                conflict_ = {members_[group_[i]].who, members_[group_[j]].who};
+                return;
+            }
+        }
+        mode_ = merged;
+    }
+
+    void note_rounding(Member& member, const X& before) const
+    {
+        double size = 0;
+        for (std::size_t c = 0; c < size_of(before); ++c) {
+            if (!differs(member.result, before, c)) continue;
+            const double from = at(before, c), to = at(member.result, c);
+            size = std::max({size, std::fabs(from), std::fabs(to), std::fabs(to - from)});
+        }
+        member.rounding = 16 * std::numeric_limits<double>::epsilon() * size;
+    }
+
+    [[nodiscard]] static std::size_t size_of(const X& x) noexcept
+    {
+        return static_cast<std::size_t>(x.size());
+    }
+    [[nodiscard]] static double& at(X& x, std::size_t c) noexcept
+    {
+        return x[static_cast<decltype(x.size())>(c)];
+    }
+    [[nodiscard]] static double at(const X& x, std::size_t c) noexcept
+    {
+        return x[static_cast<decltype(x.size())>(c)];
+    }
+    [[nodiscard]] static bool differs(const X& a, const X& b, std::size_t c) noexcept
+    {
+        return at(a, c) != at(b, c);
     }
 
     X after_;
     X single_;
     Mode mode_ = 0;
     std::pair<std::size_t, std::size_t> conflict_{no_guard, no_guard};
-    std::vector<std::size_t> writers_;
-    std::size_t mode_writer_ = no_guard;
-    std::size_t resizer_ = no_guard;
+    std::vector<Member> members_;  ///< of a set of several
+    std::vector<std::size_t> group_;
+    std::vector<Range> ends_;              ///< of every order
+    Mode first_mode_ = 0, last_mode_ = 0;  ///< at the start, and at the end of the last order
+    bool modes_differ_ = false;
+    std::size_t orders_ = 0;
 };
 
 }  // namespace ricochet::detail

@@ -211,7 +211,23 @@ public:
         count_restep();
         if (state_.host) return restep_on_host(s, x);
         kernel_->depart(system_.door(), state_, s, x, unused_rate_);
+        keep_departure(s, x);
         add_tangent(s, x);
+    }
+
+    /// What rounding has taken from component i of the state that the last `restep` has placed at
+    /// offset s; zero if it was at another.
+    [[nodiscard]] double lost_at(double s, std::size_t i) const noexcept
+    {
+        if (s != departed_ || departed_from_ != state_.start.value || state_.host) return 0;
+        return two_sum(state_.x0[i], s * state_.rate0[i] + (departure_[i] + state_.remainder[i]))
+            .remainder;
+    }
+    [[nodiscard]] const X& remainder() const noexcept { return state_.remainder; }
+    /// Sets what rounding has taken from component i of the state at the start.
+    void set_remainder(std::size_t i, double remainder) noexcept
+    {
+        state_.remainder[i] = remainder;
     }
 
     /// The most samples of the step that are computed by steps of their own. More are taken from
@@ -250,6 +266,7 @@ public:
             return rate_on_host(s, dxdt);
         }
         kernel_->depart(system_.door(), state_, s, x, dxdt);
+        keep_departure(s, x);
         add_tangent(s, x);
         if (kernel_->end_rate) {
             detail::move(dxdt, dxdt, 1, state_.rate0);
@@ -265,6 +282,30 @@ public:
         ++state_.flow_calls;
         state_.flow_fits &= system_->flow(system_.door(), state_.mode, time(s), x, dxdt);
         if (state_.backward) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
+    }
+
+    /// x' = f(t, x) in another mode, where the flow is the system's and not a host's.
+    void flow_in(Mode mode, double t, const X& x, X& dxdt) const
+    {
+        ++state_.flow_calls;
+        state_.flow_fits &= system_->flow(system_.door(), mode, t, x, dxdt);
+        if (state_.backward) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
+    }
+
+    /// Whether the flow at the end of the step is what it was when the step was taken: to the
+    /// rounding of its departure from the flow at the start, and where it is the slope of a series
+    /// to a millionth. @param rate  work space
+    [[nodiscard]] bool flow_ends_alike(X& rate) const
+    {
+        assign(rate, state_.x1);
+        flow(state_.h, state_.x1, rate);
+        const double part = kernel_->series ? 1e-6 : 16 * std::numeric_limits<double>::epsilon();
+        bool alike = true;
+        for_components([&](auto i) {
+            const double size = std::fabs(state_.rate0[i]) + std::fabs(state_.rate1[i]);
+            alike = alike && std::fabs(rate[i] - state_.rate1[i]) <= part * size;
+        });
+        return alike;
     }
 
     /// The rate of the step's polynomial at offset s.
@@ -500,6 +541,15 @@ private:
         for_each_component(state_.x0, function);
     }
 
+    /// Large states are not copied: their remainders are dropped at events.
+    void keep_departure(double s, const X& w) const
+    {
+        if (w.size() > 64) return;
+        departed_ = s;
+        departed_from_ = state_.start.value;
+        assign(departure_, w);
+    }
+
     /// The flow at the start; a host supplies it by `set_rate`.
     void arrive()
     {
@@ -524,6 +574,7 @@ private:
         assign(state_.remainder, state_.zero);
         state_.has_middle = false;
         state_.asked_alone = 0;
+        departed_ = std::numeric_limits<double>::quiet_NaN();
     }
 
     void resize(const X& x)
@@ -537,7 +588,7 @@ private:
         state.flow_calls = state_.flow_calls;
         state_ = std::move(state);
         place_tolerances();
-        unused_rate_ = end_slope_ = kept_rate_ = state_.zero;
+        unused_rate_ = end_slope_ = kept_rate_ = departure_ = state_.zero;
         inner_w_.fill(state_.zero);
         inner_rate_.fill(state_.zero);
         if (kernel_->renew) kernel_->renew(system_.door());
@@ -614,6 +665,9 @@ private:
     mutable StepState<X> state_;
     std::vector<double> component_atol_;
     double atol_ = 0;
+    mutable double departed_ = std::numeric_limits<double>::quiet_NaN();  ///< [s] of `departure_`
+    mutable double departed_from_ = 0;                                    ///< [s] start of its step
+    mutable X departure_;  ///< from the tangent, of the last `restep`
     X kept_rate_;
     mutable X unused_rate_, end_slope_;
     mutable std::array<X, 2> inner_w_, inner_rate_;  ///< `middle` replaces the first

@@ -44,12 +44,13 @@ std::string_view describe(Outcome outcome) noexcept
             return "a reset left the state behind a guard that bounds the motion; "
                    "let the reset put it on the surface or in front of it";
         case Outcome::endless_cascade:
-            return "resets triggered each other a hundred times at one instant; let each leave "
-                   "the surfaces of the others, or give the system a sliding mode";
+            return "resets trigger each other at one instant without an end; let each leave the "
+                   "surfaces of the others, let modes overlap by a small hysteresis, or give the "
+                   "system a sliding mode (Filippov, set_valued())";
         case Outcome::conflicting_resets:
-            return "two guards, or a guard and a time event, fired together and their resets gave "
-                   "one component, or the mode, two values; declare reset(fired, t, x) to say what "
-                   "happens then";
+            return "two guards, or a guard and a time event, fired together, and the order of "
+                   "their resets matters to one component, or to the mode; declare "
+                   "reset(fired, t, x) to say what happens then";
         case Outcome::unknown_mode: return "a reset returned a mode that is not below mode_count";
         case Outcome::step_underflow:
             return "the step fell below h_min without meeting the tolerance; "

@@ -134,6 +134,8 @@ void add(Statistics& sum, const Statistics& more) noexcept
     sum.events += more.events;
     sum.suppressed += more.suppressed;
     sum.disabled += more.disabled;
+    sum.unmet_conditions += more.unmet_conditions;
+    sum.ineffective_resets += more.ineffective_resets;
     sum.evidence.proved += more.evidence.proved;
     sum.evidence.checked += more.evidence.checked;
     sum.evidence.gated += more.evidence.gated;

@@ -162,13 +162,16 @@ TEST(Monitor, ItsEventsAreThoseOfASimulationThatTakesTheSameSteps)
         for (std::size_t k = 0; k < own.events.size(); ++k) {
             const auto& a = run.events[k];
             const auto& b = own.events[k];
-            EXPECT_EQ(a.t, b.t) << h << ' ' << k;
+            // Dyadic numbers are rounded only where the wall is located, by an ulp, and the
+            // simulation, but not the monitor, keeps what that takes from the position.
+            EXPECT_NEAR(a.t, b.t, 2.3e-16 * b.t) << h << ' ' << k;
             EXPECT_EQ(a.guard, b.guard);
             EXPECT_EQ(a.kind, b.kind);
             EXPECT_EQ(a.before, b.before);
             EXPECT_EQ(a.after, b.after);
         }
-        EXPECT_EQ(run.x, own.x);
+        EXPECT_NEAR(run.x[0], own.x[0], 2.3e-16 * 40 * 0.25);
+        EXPECT_EQ(run.x[1], own.x[1]);
         EXPECT_EQ(run.statistics.events, own.statistics.events);
         EXPECT_EQ(run.statistics.steps, own.statistics.steps);
         EXPECT_EQ(run.statistics.evidence.checked, own.statistics.evidence.checked);

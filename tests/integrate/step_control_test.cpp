@@ -30,7 +30,9 @@ TEST(StepControl, TheFactorOfAStepIsWithinItsLimitsForEveryError)
     for (int order = 1; order <= 20; ++order) {
         for (const double error : {0.0, std::numeric_limits<double>::denorm_min(), 1e-300, 1e-19}) {
             // (0.9 / 10)^20 is 1e-21; up to order 16 it is 2e-17.
-            if (error < 1e-21 || order <= 16) EXPECT_EQ(rule.factor(error, order), 10) << order;
+            if (error < 1e-21 || order <= 16) {
+                EXPECT_EQ(rule.factor(error, order), 10) << order;
+            }
         }
         for (const double error : {1e20, 1e300, std::numeric_limits<double>::max()}) {
             EXPECT_EQ(rule.factor(error, order), 0.2) << order;

@@ -24,7 +24,8 @@ void expect_no_allocation(const System& system, const StateOf<System>& w0,
     EXPECT_GT(motion.statistics().accepted, 20U);
 }
 
-/// A size that the library has not compiled: two masses between springs, with friction, and a filter.
+/// A size that the library has not compiled: two masses between springs, with friction, and a
+/// filter.
 struct TwoMasses {
     static constexpr int state_size = 5;
     static constexpr int reaction_size = 2;
@@ -68,9 +69,8 @@ TEST(NonsmoothAllocation, StepsOfFixedSizeAllocateNothing)
          .scheme = {.stage = {.method = StageMethod::fixed_point, .tolerance = 1e-10}}});
     expect_no_allocation(InclineBlock(), {1, 1, 0, 0}, {.t_end = 1, .step = 0.01});
     for (const StageMethod method : {StageMethod::automatic, StageMethod::newton}) {
-        expect_no_allocation(
-            TwoMasses(), {1, 0, 0, 0, 0},
-            {.t_end = 1, .step = 0.01, .scheme = {.stage = {.method = method}}});
+        expect_no_allocation(TwoMasses(), {1, 0, 0, 0, 0},
+                             {.t_end = 1, .step = 0.01, .scheme = {.stage = {.method = method}}});
     }
     expect_no_allocation(TwoMasses(), {1, 0, 0, 0, 0},
                          {.t_end = 1, .step = 0.01, .switches = Switches::located});

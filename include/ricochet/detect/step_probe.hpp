@@ -272,6 +272,10 @@ public:
     /// space.
     [[nodiscard]] bool is_settled() const noexcept { return settled_; }
 
+    /// Offset [s] of the state in the work space, after `is_settled` of the sample from which the
+    /// line starts.
+    [[nodiscard]] double placed() const noexcept { return placed_; }
+
     void complete(GuardSample& sample) override
     {
         if (sample.rate == sample.rate) return;

@@ -106,6 +106,11 @@ struct Statistics {
     std::uint64_t events = 0;
     std::uint64_t suppressed = 0;  ///< repeats of an event inside its own window
     std::uint64_t disabled = 0;    ///< crossings that `enabled` rejected
+    /// Events at which no state was found that has left the guard's side in floating point.
+    std::uint64_t unmet_conditions = 0;
+    /// Events whose reset returned its mode and left the state alone, with a mode also when it was
+    /// asked again beyond the surface.
+    std::uint64_t ineffective_resets = 0;
     EvidenceCounts evidence;
 };
 

@@ -271,15 +271,20 @@ template <class X>
 ///     F, s     = the earliest set of acting guards that leave their side within (0, h], and its
 ///                offset; nothing and h if there is none
 ///     record the events of all other guards within (0, s], located on the step's polynomial
-///     t, x⁻    = t + s, Phi(s; q, t, x)
-///     while F is not empty, at most 100 times:
-///         x⁺, q⁺   = r_F(q, t, x⁻), where every reset of F reads x⁻
+///     t, x⁻    = t + s, Phi(s; q, t, x), moved along the flow by the rounding that keeps a guard
+///                of F on its side
+///     while F is not empty:
+///         x⁺, q⁺   = r_F(q, t, x⁻); resets of F that change a common component follow each other
 ///         x⁺, q⁺   = rest(t, x⁺) where the events of a guard of F accumulate at t
 ///         record (t, F, q, x⁻, q⁺, x⁺)
 ///         arm every guard at (q⁺, t, x⁺): on its sign, or on its surface on the sign of its rate
-///         F        = the guards that x⁺ has carried across their surfaces in their direction
+///         F        = the guards that x⁺ has carried across their surfaces in their direction, and
+///                    those on their surfaces that the flow of q⁺ carries across and that of q did
+///                    not
 ///         x⁻, q    = x⁺, q⁺
 ///     x        = x⁻
+///
+/// (the run ends where F, q and x⁻ repeat, or a guard fires for the thousandth time at t)
 ///
 /// so that steps are half-open, (t, t + h]: a zero at the end of a step belongs to it, a zero at
 /// its start to the step before. A guard acts if it has a reset or may end the run. The set F does

@@ -63,7 +63,9 @@ void write_statistics(rc_statistics* statistics, const Counts& counts)
                   .gated = from.evidence.gated,
                   .assumed = from.evidence.assumed,
                   .guard = counts.guard,
-                  .other_guard = counts.other_guard},
+                  .other_guard = counts.other_guard,
+                  .unmet_conditions = from.unmet_conditions,
+                  .ineffective_resets = from.ineffective_resets},
                  "rc_statistics");
 }
 

@@ -80,6 +80,8 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     add("events", s.events);
     add("suppressed", s.suppressed);
     add("disabled", s.disabled);
+    add("unmet_conditions", s.unmet_conditions);
+    add("ineffective_resets", s.ineffective_resets);
     counts["evidence"] = evidence;
     return space(**counts);
 }

@@ -1,0 +1,625 @@
+// What an event means at its borders: small systems with exact answers, for every method and
+// locator. x⁻ is the state that a reset sees, x⁺ what it leaves.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "ricochet/detect/extremum.hpp"
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/locate/locators.hpp"
+
+namespace ricochet {
+namespace {
+
+/// An automaton put together from functions, with states of any type.
+template <class X>
+struct Machine {
+    using State = X;
+    std::size_t guard_count_ = 1;
+    Mode mode_count_ = 64;
+    std::function<void(Mode, double, const X&, X&)> f;
+    std::function<double(std::size_t, Mode, double, const X&)> g;
+    std::function<Mode(std::size_t, Mode, double, X&)> r;
+    std::function<bool(std::size_t, Mode)> on = [](std::size_t, Mode) { return true; };
+    GuardInfo info{};
+
+    [[nodiscard]] std::size_t guard_count() const { return guard_count_; }
+    [[nodiscard]] std::size_t mode_count() const { return mode_count_; }
+    void flow(Mode m, double t, const X& x, X& dxdt) const { f(m, t, x, dxdt); }
+    [[nodiscard]] double guard(std::size_t i, Mode m, double t, const X& x) const
+    {
+        return g(i, m, t, x);
+    }
+    Mode reset(std::size_t i, Mode m, double t, X& x) const { return r(i, m, t, x); }
+    [[nodiscard]] bool enabled(std::size_t i, Mode m) const { return on(i, m); }
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const { return info; }
+};
+
+/// The same with ticks.
+template <class X>
+struct Ticking : Machine<X> {
+    std::vector<double> ticks;
+    std::function<Mode(Mode, double, X&)> tick = [](Mode m, double, X&) { return m; };
+
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        for (const double tick_time : ticks) {
+            if (tick_time > t) return tick_time;
+        }
+        return std::numeric_limits<double>::infinity();
+    }
+    Mode time_reset(Mode m, double t, X& x) const { return tick(m, t, x); }
+};
+
+template <std::size_t n>
+using Array = std::array<double, n>;
+
+/// Calls `check(run, label)` for a run by each of several methods and locators.
+template <class System, class X, class Check>
+void by_all(const System& system, const X& x0, const Options& options, const Check& check)
+{
+    const auto by = [&](const auto& stepping, const std::string& label, double step) {
+        Options own = options;
+        own.step = step;
+        check(integrate(system, x0, own, stepping, Extremum{}, Newton{}), label + ", newton");
+        check(integrate(system, x0, own, stepping, Extremum{}, Bisection{}), label + ", bisection");
+        check(integrate(system, x0, own, stepping, Extremum{}, Toms748{}), label + ", toms748");
+        check(integrate(system, x0, own, stepping, Ends{}, Newton{}), label + ", ends");
+    };
+    by(ErrorControlled<Dopri5>{}, "dopri5", 0);
+    by(ErrorControlled<Fehlberg78>{}, "fehlberg78", 0);
+    by(FixedStep<Rk4>{}, "rk4", 0.0173);
+}
+
+// --- at the event the condition holds ---
+
+TEST(Meaning, AThermostatThatReadsItsTemperatureAgainStaysInItsBand)
+{
+    // Cooling and heating alternate between 15.5 and 17; 48 events to t = 48, the times in closed
+    // form: each phase is an exponential towards 0 or 30 with the rate 0.1.
+    const auto time_to = [](double from, double to, double target) {
+        return 10 * std::log((from - target) / (to - target));
+    };
+    double t = time_to(15.75, 15.5, 0);
+    double last = t;
+    int events = 0;
+    for (bool on = true; t <= 48; on = !on) {
+        last = t;
+        ++events;
+        t += on ? time_to(15.5, 17, 30) : time_to(17, 15.5, 0);
+    }
+    Machine<Array<1>> room;
+    room.f = [](Mode on, double, const auto& x, auto& dxdt) {
+        dxdt[0] = -0.1 * (x[0] - (on ? 30 : 0));
+    };
+    room.g = [](std::size_t, Mode on, double, const auto& x) {
+        return on ? 17 - x[0] : x[0] - 15.5;
+    };
+    room.r = [](std::size_t, Mode m, double, auto& x) -> Mode {
+        return x[0] <= 15.5 ? 1 : x[0] >= 17 ? 0 : m;
+    };
+    EXPECT_EQ(events, 48);
+    by_all(room, Array<1>{15.75}, {.t_end = 48, .rtol = 1e-10, .atol = 1e-12},
+           [&](const auto& run, const std::string& label) {
+               ASSERT_EQ(run.events.size(), 48U) << label;
+               EXPECT_NEAR(run.events.back().t, last, 1e-6) << label;
+               EXPECT_NEAR(run.x[0], 16.3558078684, 1e-6) << label;
+               EXPECT_EQ(run.mode, 0U) << label;
+           });
+}
+
+TEST(Meaning, ABreakawayThatReadsItsLoadAgainSlips)
+{
+    Machine<Array<1>> block;
+    block.f = [](Mode, double, const auto&, auto& dxdt) { dxdt[0] = 0; };
+    block.g = [](std::size_t, Mode, double t, const auto&) { return 0.5 - std::sin(t); };
+    block.r = [](std::size_t, Mode m, double t, auto&) -> Mode {
+        return std::sin(t) >= 0.5 ? 1 : m;
+    };
+    block.on = [](std::size_t, Mode m) { return m == 0; };
+    by_all(block, Array<1>{0}, {.t_end = 1}, [](const auto& run, const std::string& label) {
+        ASSERT_EQ(run.events.size(), 1U) << label;
+        EXPECT_NEAR(run.events[0].t, std::numbers::pi / 6, 4e-16) << label;
+        EXPECT_EQ(run.mode, 1U) << label;
+    });
+}
+
+TEST(Meaning, TheStateBeforeHasLeftItsSideAtThousandsOfRandomPlaces)
+{
+    // Floors at sizes from 1e-6 to 1e6, guards that round in several ways.
+    std::uint64_t wrong = 0, all = 0;
+    for (int k = 0; k < 400; ++k) {
+        const double size = std::pow(10.0, -6 + 12.0 * k / 400);
+        const double floor = size * (1 + 0.3 * std::sin(12.9898 * k));
+        for (int form = 0; form < 4; ++form) {
+            Machine<Array<2>> ball;
+            ball.f = [](Mode, double, const auto& x, auto& dxdt) { dxdt = {x[1], -1}; };
+            ball.g = [=](std::size_t, Mode, double, const auto& x) {
+                switch (form) {
+                    case 0: return x[0] - floor;
+                    case 1: return x[0] / floor - 1;
+                    case 2: return x[0] * x[0] - floor * floor;
+                    default: return std::hypot(x[0], floor) - std::numbers::sqrt2 * floor;
+                }
+            };
+            ball.r = [&, g = ball.g](std::size_t i, Mode m, double t, auto& x) -> Mode {
+                ++all;
+                wrong += !(g(i, m, t, x) <= 0);
+                x[1] = -0.5 * x[1];
+                return m;
+            };
+            ball.info.stop_after = 3;
+            const auto run = integrate(ball, Array<2>{2 * floor, 0.1 * std::sqrt(floor)},
+                                       {.t_end = 100 * std::sqrt(size)});
+            EXPECT_EQ(run.outcome, Outcome::stopped_by_event);
+        }
+    }
+    EXPECT_EQ(wrong, 0U) << "of " << all;
+    EXPECT_EQ(all, 4800U);
+}
+
+// --- resets that write the same component ---
+
+/// x' = 0 with guards that fall through zero together at t = 1.
+Machine<Array<1>> together(std::vector<std::function<double(double)>> resets)
+{
+    Machine<Array<1>> machine;
+    machine.guard_count_ = resets.size();
+    machine.f = [](Mode, double, const auto&, auto& dxdt) { dxdt[0] = 0; };
+    machine.g = [](std::size_t, Mode, double t, const auto&) { return 1 - t; };
+    machine.r = [resets](std::size_t i, Mode m, double, auto& x) {
+        x[0] = resets[i](x[0]);
+        return m;
+    };
+    return machine;
+}
+
+TEST(Meaning, EqualIncrementsAddAndOtherResetsFollowEachOther)
+{
+    const auto end_of = [](double x0, std::vector<std::function<double(double)>> resets) {
+        const auto run = integrate(together(std::move(resets)), Array<1>{x0}, {.t_end = 2});
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        return run.x[0];
+    };
+    const auto half = [](double x) { return x * 0.5; };
+    const auto at_most = [](double most) { return [=](double x) { return std::min(x, most); }; };
+    const auto dose = [](double x) { return std::min(x + 2, 10.0); };
+    EXPECT_EQ(end_of(8, {half, half}), 2);
+    EXPECT_EQ(end_of(3, {at_most(1), at_most(2)}), 1);
+    EXPECT_EQ(end_of(3, {at_most(2), at_most(1)}), 1);
+    EXPECT_EQ(end_of(7, {dose, dose}), 10);
+    EXPECT_EQ(end_of(7, {[](double) { return 5.0; }, [](double) { return 5.0; }}), 5);
+    EXPECT_EQ(end_of(0, {[](double x) { return 1 - x; }, [](double x) { return 1 - x; }}), 0);
+    const auto more = [](double x) { return x + 2; };
+    EXPECT_EQ(end_of(1, {more, more, more}), 7);
+    EXPECT_EQ(end_of(1, std::vector<std::function<double(double)>>(200, more)), 401);
+}
+
+TEST(Meaning, ResetsWhoseOrderMattersConflictInEitherOrder)
+{
+    const auto set = [](double) { return -3.5; };
+    const auto add = [](double x) { return x + 1; };
+    for (const bool swapped : {false, true}) {
+        const auto machine = swapped ? together({add, set}) : together({set, add});
+        const auto run = integrate(machine, Array<1>{-4.5}, {.t_end = 2});
+        EXPECT_EQ(run.outcome, Outcome::conflicting_resets);
+        EXPECT_EQ(run.guard + run.other_guard, 1U);
+        EXPECT_NEAR(run.t, 1, 1e-15);
+    }
+}
+
+TEST(Meaning, AddedDosesDecayAsTheyShould)
+{
+    Machine<Array<1>> drug;
+    drug.guard_count_ = 2;
+    drug.f = [](Mode, double, const auto& x, auto& dxdt) { dxdt[0] = -x[0]; };
+    drug.g = [](std::size_t, Mode, double t, const auto&) { return 2.95 - t; };
+    drug.r = [](std::size_t, Mode m, double, auto& x) {
+        x[0] += 2;
+        return m;
+    };
+    const double expected = std::exp(-10.0) + 4 * std::exp(-7.05);
+    by_all(drug, Array<1>{1}, {.t_end = 10, .rtol = 1e-11, .atol = 1e-13},
+           [&](const auto& run, const std::string& label) {
+               EXPECT_NEAR(run.x[0], expected, 1e-9) << label;
+           });
+
+    Ticking<Array<1>> timed;
+    static_cast<Machine<Array<1>>&>(timed) = drug;
+    timed.guard_count_ = 1;
+    timed.ticks = {2.95};
+    timed.tick = [](Mode m, double, auto& x) {
+        x[0] += 2;
+        return m;
+    };
+    by_all(timed, Array<1>{1}, {.t_end = 10, .rtol = 1e-11, .atol = 1e-13},
+           [&](const auto& run, const std::string& label) {
+               EXPECT_NEAR(run.x[0], expected, 1e-9) << label;
+           });
+}
+
+TEST(Meaning, CoincidentFloorsStrikeOnceAndUnequalOnesConflict)
+{
+    const auto ball = [](std::array<double, 2> restitution) {
+        Machine<Array<3>> machine;
+        machine.guard_count_ = 2;
+        machine.f = [](Mode, double, const auto& x, auto& dxdt) { dxdt = {x[1], -2, 0}; };
+        machine.g = [](std::size_t, Mode, double, const auto& x) { return x[0]; };
+        machine.r = [restitution](std::size_t i, Mode m, double, auto& x) {
+            x[0] = 0;
+            x[1] *= -restitution[i];
+            x[2] += 1;
+            return m;
+        };
+        return machine;
+    };
+    by_all(ball({0.5, 0.5}), Array<3>{1, 0, 0}, {.t_end = 1.5},
+           [](const auto& run, const std::string& label) {
+               ASSERT_EQ(run.events.size(), 2U) << label;
+               EXPECT_NEAR(run.events[0].t, 1, 1e-14) << label;
+               EXPECT_NEAR(run.events[0].after[1], 1, 1e-13) << label;
+               EXPECT_EQ(run.x[2], 2) << label;
+           });
+    for (const auto& e : {std::array{0.5, 0.8}, std::array{0.8, 0.5}}) {
+        by_all(ball(e), Array<3>{1, 0, 0}, {.t_end = 1.5},
+               [](const auto& run, const std::string& label) {
+                   EXPECT_EQ(run.outcome, Outcome::conflicting_resets) << label;
+                   EXPECT_NEAR(run.t, 1, 1e-14) << label;
+               });
+    }
+}
+
+/// A point in the plane that meets two elastic walls through the origin at once.
+Machine<Array<4>> corner(std::array<std::array<double, 2>, 2> normals)
+{
+    Machine<Array<4>> machine;
+    machine.guard_count_ = 2;
+    machine.f = [](Mode, double, const auto& x, auto& dxdt) { dxdt = {x[2], x[3], 0, 0}; };
+    machine.g = [normals](std::size_t i, Mode, double, const auto& x) {
+        return normals[i][0] * x[0] + normals[i][1] * x[1];
+    };
+    machine.r = [normals](std::size_t i, Mode m, double, auto& x) {
+        const auto [a, b] = normals[i];
+        const double speed = a * x[2] + b * x[3];
+        x[2] -= 2 * speed * a;
+        x[3] -= 2 * speed * b;
+        return m;
+    };
+    return machine;
+}
+
+TEST(Meaning, ARightCornerSendsAPointBackAndAWideOneConflicts)
+{
+    by_all(corner({{{0.6, 0.8}, {-0.8, 0.6}}}), Array<4>{0, 1, 0, -1}, {.t_end = 2},
+           [](const auto& run, const std::string& label) {
+               EXPECT_EQ(run.outcome, Outcome::reached_end) << label;
+               EXPECT_NEAR(run.x[0], 0, 1e-13) << label;
+               EXPECT_NEAR(run.x[1], 1, 1e-13) << label;
+           });
+    const double a = std::sqrt(3.0) / 2;
+    by_all(corner({{{a, 0.5}, {-a, 0.5}}}), Array<4>{0, 1, 0, -1}, {.t_end = 2},
+           [](const auto& run, const std::string& label) {
+               EXPECT_EQ(run.outcome, Outcome::conflicting_resets) << label;
+               EXPECT_NEAR(run.t, 1, 1e-14) << label;
+           });
+}
+
+TEST(Meaning, BitsOfTheModeAreSetTogether)
+{
+    Machine<Array<2>> machine;
+    machine.guard_count_ = 2;
+    machine.f = [](Mode, double, const auto&, auto& dxdt) { dxdt = {1, 1}; };
+    machine.g = [](std::size_t i, Mode, double, const auto& x) { return 1 - x[i]; };
+    machine.on = [](std::size_t i, Mode m) { return (m >> i & 1) == 0; };
+    machine.r = [](std::size_t i, Mode m, double, auto&) { return m | Mode{1} << i; };
+    by_all(machine, Array<2>{0, 0}, {.t_end = 2}, [](const auto& run, const std::string& label) {
+        EXPECT_EQ(run.outcome, Outcome::reached_end) << label;
+        EXPECT_EQ(run.mode, 3U) << label;
+    });
+    machine.on = [](std::size_t, Mode m) { return m == 0; };
+    machine.r = [](std::size_t i, Mode, double, auto&) { return static_cast<Mode>(i + 1); };
+    const auto run = integrate(machine, Array<2>{0, 0}, {.t_end = 2});
+    EXPECT_EQ(run.outcome, Outcome::conflicting_resets);
+}
+
+// --- a mode that is left at once ---
+
+TEST(Meaning, ARelayIsReportedAndNotPassedOver)
+{
+    const auto relay = [](double sign) {
+        Machine<Array<1>> machine;
+        machine.f = [sign](Mode m, double, const auto&, auto& dxdt) {
+            dxdt[0] = sign * (m ? 1 : -1);
+        };
+        machine.g = [sign](std::size_t, Mode m, double, const auto& x) {
+            return sign * (m ? -x[0] : x[0]);
+        };
+        machine.r = [](std::size_t, Mode m, double, auto&) -> Mode { return 1 - m; };
+        return machine;
+    };
+    for (const double sign : {1.0, -1.0}) {
+        by_all(relay(sign), Array<1>{sign}, {.t_end = 3},
+               [](const auto& run, const std::string& label) {
+                   EXPECT_EQ(run.outcome, Outcome::endless_cascade) << label;
+                   EXPECT_NEAR(run.t, 1, 1e-14) << label;
+                   EXPECT_LE(run.events.size(), 8U) << label;
+               });
+    }
+    // With two guards, and no word about which is enabled.
+    Machine<Array<1>> two = relay(1);
+    two.guard_count_ = 2;
+    two.g = [](std::size_t i, Mode, double, const auto& x) { return i == 0 ? x[0] : -x[0]; };
+    two.r = [](std::size_t i, Mode, double, auto&) -> Mode { return i == 0 ? 1 : 0; };
+    by_all(two, Array<1>{1}, {.t_end = 3}, [](const auto& run, const std::string& label) {
+        EXPECT_EQ(run.outcome, Outcome::endless_cascade) << label;
+        EXPECT_NEAR(run.t, 1, 1e-14) << label;
+    });
+}
+
+TEST(Meaning, ASignInTheStateIsAModeToo)
+{
+    Machine<Array<2>> machine;
+    machine.f = [](Mode, double, const auto& x, auto& dxdt) { dxdt = {-x[1], 0}; };
+    machine.g = [](std::size_t, Mode, double, const auto& x) { return x[1] * x[0]; };
+    machine.r = [](std::size_t, Mode m, double, auto& x) {
+        x[1] = -x[1];
+        return m;
+    };
+    by_all(machine, Array<2>{1, 1}, {.t_end = 3}, [](const auto& run, const std::string& label) {
+        EXPECT_EQ(run.outcome, Outcome::endless_cascade) << label;
+        EXPECT_NEAR(run.t, 1, 1e-14) << label;
+    });
+}
+
+TEST(Meaning, ACrossingThatGoesOnInTheNextModeIsOneEvent)
+{
+    Machine<Array<1>> machine;
+    machine.f = [](Mode, double, const auto&, auto& dxdt) { dxdt[0] = -1; };
+    machine.g = [](std::size_t, Mode, double, const auto& x) { return x[0] - 1; };
+    machine.r = [](std::size_t, Mode m, double, auto&) { return m + 1; };
+    by_all(machine, Array<1>{3}, {.t_end = 5}, [](const auto& run, const std::string& label) {
+        EXPECT_EQ(run.events.size(), 1U) << label;
+        EXPECT_EQ(run.mode, 1U) << label;
+        EXPECT_NEAR(run.x[0], -2, 1e-12) << label;
+    });
+}
+
+TEST(Meaning, AModeThatTakesNoTimeIsPassed)
+{
+    Machine<Array<1>> machine;
+    machine.f = [](Mode m, double, const auto&, auto& dxdt) { dxdt[0] = m == 1 ? 1 : -1; };
+    machine.g = [](std::size_t, Mode m, double, const auto& x) { return m == 0 ? x[0] : -x[0]; };
+    machine.r = [](std::size_t, Mode m, double, auto&) { return m + 1; };
+    by_all(machine, Array<1>{1}, {.t_end = 3}, [](const auto& run, const std::string& label) {
+        ASSERT_EQ(run.events.size(), 2U) << label;
+        EXPECT_NEAR(run.events[0].t, 1, 1e-14) << label;
+        EXPECT_NEAR(run.events[1].t, 1, 1e-14) << label;
+        EXPECT_EQ(run.mode, 2U) << label;
+    });
+}
+
+TEST(Meaning, ATickThatStartsAMotionIntoASurfaceHasItsEvent)
+{
+    for (const bool says : {false, true}) {
+        Ticking<Array<1>> machine;
+        machine.ticks = {1};
+        machine.tick = [](Mode, double, auto&) -> Mode { return 1; };
+        machine.f = [](Mode m, double, const auto&, auto& dxdt) { dxdt[0] = m ? -1 : 0; };
+        machine.g = [](std::size_t, Mode, double, const auto& x) { return x[0]; };
+        machine.r = [](std::size_t, Mode, double, auto&) -> Mode { return 0; };
+        if (says) machine.on = [](std::size_t, Mode m) { return m == 1; };
+        by_all(machine, Array<1>{0}, {.t_end = 3}, [&](const auto& run, const std::string& label) {
+            EXPECT_EQ(run.events.size(), 2U) << label << says;
+            EXPECT_EQ(run.x[0], 0) << label << says;
+            EXPECT_EQ(run.mode, 0U) << label << says;
+        });
+    }
+}
+
+TEST(Meaning, ATriangleWaveAndAStaircaseOfModesHaveEveryEvent)
+{
+    Machine<Array<1>> wave;
+    wave.f = [](Mode m, double, const auto&, auto& dxdt) { dxdt[0] = m ? 1 : -1; };
+    wave.g = [](std::size_t, Mode m, double, const auto& x) { return m ? 1 - x[0] : x[0]; };
+    wave.r = [](std::size_t, Mode m, double, auto&) -> Mode { return 1 - m; };
+    by_all(wave, Array<1>{0.5}, {.t_end = 4}, [](const auto& run, const std::string& label) {
+        ASSERT_EQ(run.events.size(), 4U) << label;
+        for (std::size_t k = 0; k < 4; ++k) {
+            EXPECT_NEAR(run.events[k].t, 0.5 + static_cast<double>(k), 1e-14) << label;
+        }
+    });
+    Machine<Array<1>> stairs;
+    stairs.f = [](Mode, double, const auto&, auto& dxdt) { dxdt[0] = -1; };
+    stairs.g = [](std::size_t, Mode m, double, const auto& x) {
+        return x[0] - std::array{1.0, 0.5, 0.0}[m];
+    };
+    stairs.r = [](std::size_t, Mode m, double, auto&) { return m + 1; };
+    stairs.on = [](std::size_t, Mode m) { return m < 3; };
+    by_all(stairs, Array<1>{2}, {.t_end = 3}, [](const auto& run, const std::string& label) {
+        ASSERT_EQ(run.events.size(), 3U) << label;
+        EXPECT_NEAR(run.events[1].t, 1.5, 1e-14) << label;
+        EXPECT_NEAR(run.events[2].t, 2, 1e-14) << label;
+        EXPECT_EQ(run.mode, 3U) << label;
+    });
+}
+
+TEST(Meaning, FrictionAsAnAutomatonWithOneGuardIsReported)
+{
+    // The block stops at t = 1; either direction of sliding is left where it begins.
+    Machine<Array<1>> block;
+    block.f = [](Mode m, double, const auto&, auto& dxdt) { dxdt[0] = m == 0 ? -1 : 1; };
+    block.g = [](std::size_t, Mode m, double, const auto& x) { return m == 0 ? x[0] : -x[0]; };
+    block.r = [](std::size_t, Mode m, double, auto&) -> Mode { return 1 - m; };
+    by_all(block, Array<1>{1}, {.t_end = 3}, [](const auto& run, const std::string& label) {
+        EXPECT_EQ(run.outcome, Outcome::endless_cascade) << label;
+        EXPECT_NEAR(run.t, 1, 1e-14) << label;
+    });
+}
+
+TEST(Meaning, AReleaseWhoseForceIsZeroLeavesByItsJerk)
+{
+    // A block rests on an inclined seat until the load has grown to its weight; then x, x', x'' are
+    // zero, and the derivative of the load decides.
+    for (const double side : {0.25, -0.25}) {
+        Machine<Array<2>> block;
+        block.f = [side](Mode m, double t, const auto& x, auto& dxdt) {
+            if (m == 0) {
+                dxdt = {0, 0};
+                return;
+            }
+            const double s = m == 1 ? side : -side;
+            dxdt = {x[1], -std::sin(s - x[0]) + 0.625 * std::sin(t) * std::cos(s - x[0])};
+        };
+        block.guard_count_ = 3;
+        block.on = [](std::size_t i, Mode m) { return i == m; };
+        block.g = [](std::size_t i, Mode, double t, const auto& x) {
+            return i == 0 ? std::tan(0.25) - 0.625 * std::sin(t) : i == 1 ? x[0] : -x[0];
+        };
+        block.r = [](std::size_t i, Mode m, double, auto& x) -> Mode {
+            if (i == 0) return 1;
+            x[1] *= 0.9;
+            return 3 - m;
+        };
+        if (side < 0) continue;
+        by_all(block, Array<2>{0, 0}, {.t_end = 1.5},
+               [](const auto& run, const std::string& label) {
+                   EXPECT_EQ(run.outcome, Outcome::reached_end) << label;
+                   EXPECT_EQ(run.events.size(), 1U) << label;
+                   EXPECT_EQ(run.mode, 1U) << label;
+                   EXPECT_GT(run.x[0], 0) << label;
+               });
+    }
+}
+
+// --- rounding ---
+
+TEST(Meaning, TimeDoesNotDriftWhereTheStateIsLeftAlone)
+{
+    // x' = 1 from 0.1, events wherever x has grown by another 0.1: event k at k 0.1, in which the
+    // product is rounded once, the level once, and the time once.
+    for (const bool sized_at_run_time : {false, true}) {
+        const auto check = [&](const auto& x0) {
+            Machine<std::remove_cvref_t<decltype(x0)>> machine;
+            machine.f = [](Mode, double, const auto&, auto& dxdt) {
+                dxdt[0] = 1;
+                dxdt[1] = 0;
+            };
+            machine.g = [](std::size_t, Mode, double, const auto& x) { return 0.1 * x[1] - x[0]; };
+            machine.r = [](std::size_t, Mode m, double, auto& x) {
+                x[1] += 1;
+                return m;
+            };
+            by_all(machine, x0, {.t_end = 10000.05},
+                   [&](const auto& run, const std::string& label) {
+                       ASSERT_EQ(run.events.size(), 100000U) << label;
+                       double worst = 0;
+                       for (std::size_t k = 0; k < run.events.size(); ++k) {
+                           const double t = 0.1 * static_cast<double>(k + 1);
+                           const double ulp = std::nextafter(t, 1e9) - t;
+                           worst = std::max(worst, std::fabs(run.events[k].t - t) / ulp);
+                       }
+                       EXPECT_LE(worst, 2) << label;
+                   });
+        };
+        if (sized_at_run_time) {
+            check(std::vector<double>{0, 1});
+        } else {
+            check(Array<2>{0, 1});
+        }
+    }
+}
+
+TEST(Meaning, AResetThatDeclinesOnItsSurfaceIsAskedBeyondIt)
+{
+    Machine<Array<1>> machine;
+    int calls = 0;
+    machine.f = [](Mode, double, const auto&, auto& dxdt) { dxdt[0] = -1; };
+    machine.g = [](std::size_t, Mode, double, const auto& x) { return x[0]; };
+    machine.r = [&calls](std::size_t, Mode m, double, auto& x) -> Mode {
+        ++calls;
+        return x[0] < 0 ? 7 : m;
+    };
+    by_all(machine, Array<1>{1}, {.t_end = 2}, [&](const auto& run, const std::string& label) {
+        ASSERT_EQ(run.events.size(), 1U) << label;
+        EXPECT_NEAR(run.events[0].t, 1, 2e-15) << label;
+        EXPECT_EQ(run.mode, 7U) << label;
+        EXPECT_EQ(run.statistics.ineffective_resets, 0U) << label;
+        EXPECT_LE(std::exchange(calls, 0), 2) << label;
+    });
+    machine.r = [](std::size_t, Mode m, double, auto&) { return m; };
+    by_all(machine, Array<1>{1}, {.t_end = 2}, [&](const auto& run, const std::string& label) {
+        EXPECT_EQ(run.events.size(), 1U) << label;
+        EXPECT_EQ(run.statistics.ineffective_resets, 1U) << label;
+    });
+}
+
+// --- cascades ---
+
+TEST(Meaning, AnAvalancheOfTenThousandIsLegal)
+{
+    constexpr std::size_t n = 2000;
+    Machine<std::vector<double>> row;
+    row.guard_count_ = n;
+    row.f = [](Mode, double, const auto&, auto& dxdt) {
+        std::fill(dxdt.begin(), dxdt.end(), 0);
+        dxdt[0] = 1;
+    };
+    row.info.crossing = Crossing::rising;
+    row.g = [](std::size_t i, Mode, double, const auto& x) { return x[i] - 1; };
+    row.r = [](std::size_t i, Mode m, double, auto& x) {
+        x[i] = 0;
+        if (i + 1 < n) x[i + 1] += 0.6;
+        return m;
+    };
+    const auto run = integrate(row, std::vector<double>(n, 0.5), {.t_end = 0.75});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.events.size(), n);
+    EXPECT_NEAR(run.x[0], 0.25, 1e-13);
+}
+
+// --- functions that change outside of the state ---
+
+TEST(Meaning, AResetThatChangesAVariableOfTheFlowCutsTheStep)
+{
+    // y'' = -k y with k toggled between 1 and 4 wherever y = 0: at y = 0 the flows are equal.
+    double k = 1;
+    Machine<Array<2>> spring;
+    spring.f = [&k](Mode, double, const auto& x, auto& dxdt) { dxdt = {x[1], -k * x[0]}; };
+    spring.info.crossing = Crossing::either;
+    spring.g = [](std::size_t, Mode, double, const auto& x) { return x[0]; };
+    spring.r = [&k](std::size_t, Mode m, double, auto&) {
+        k = k == 1 ? 4 : 1;
+        return m;
+    };
+    // A quarter of a period at k = 1, then halves of pi / 2 and pi in turn; at 1.5 pi the second
+    // half has just begun from (0, -1) x 1/... : y there is -1 at the end of a quarter of k = 1.
+    k = 1;
+    const auto run = integrate(spring, Array<2>{1, 0},
+                               {.t_end = 1.5 * std::numbers::pi, .rtol = 1e-10, .atol = 1e-12});
+    EXPECT_EQ(run.events.size(), 2U);
+    EXPECT_NEAR(run.x[0], 1, 1e-6);
+}
+
+TEST(Meaning, AResetThatChangesAVariableOfTheGuardCutsTheStep)
+{
+    double level = 1;
+    Machine<Array<1>> ramp;
+    ramp.f = [](Mode, double, const auto&, auto& dxdt) { dxdt[0] = 1; };
+    ramp.g = [&level](std::size_t, Mode, double, const auto& x) { return level - x[0]; };
+    ramp.r = [&level](std::size_t, Mode m, double, auto&) {
+        level += 1;
+        return m;
+    };
+    const auto run = integrate(ramp, Array<1>{0}, {.t_end = 10.5});
+    EXPECT_EQ(run.events.size(), 10U);
+}
+
+}  // namespace
+}  // namespace ricochet
