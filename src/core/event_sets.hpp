@@ -189,6 +189,15 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
         move(x, before_, ahead, rate_);
         if (holds(ahead)) return true;
     }
+    // A state that the flow moves by less than its last place stays where it is: by units in the
+    // last place of its components.
+    assign(x, before_);
+    for (int k = 0; k < 4; ++k) {
+        for_each_component(x, [&](auto i) {
+            if (rate_[i] != 0) x[i] = std::nextafter(x[i], std::copysign(HUGE_VAL, rate_[i]));
+        });
+        if (holds(0)) return true;
+    }
     return false;
 }
 
