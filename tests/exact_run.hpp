@@ -116,7 +116,7 @@ public:
           sides_(problem.system.guard_count(), Side::plateau)
     {
         for (std::size_t c = 0; c < 3; ++c) run_.x[c] = problem.x0[c];
-        run_.mode = problem.mode;
+        run_.mode = mode_left_ = problem.mode;
     }
 
     [[nodiscard]] ExactRun operator()()
@@ -237,6 +237,7 @@ private:
         for (int level = 0; on_time || !members.empty(); ++level, on_time = false) {
             if (level == most_levels) return give_up();
             run_.cascades += level == 1;
+            mode_left_ = run_.mode;
             reset(members, on_time);
             if (!run_.regular) return;
             members = arm(members);
@@ -245,30 +246,134 @@ private:
         fired_.clear();
     }
 
-    void reset(const Guards& members, bool on_time)
+    using Point = std::array<Real, 3>;
+
+    /// x' in a mode, in the direction of the run.
+    [[nodiscard]] Point flow(Mode mode, const Point& x) const
     {
-        const std::array<Real, 3> before = run_.x;
+        const RandomSystem::Flow& f = system_->flows[mode];
+        return {sign_ * (f.drift[0] + f.c01 * x[1] + f.c02 * x[2]),
+                sign_ * (f.drift[1] + f.c12 * x[2]), sign_ * f.drift[2]};
+    }
+    /// Rate of guard i with x' = rate.
+    [[nodiscard]] Real rate_of(std::size_t i, const Point& rate) const
+    {
+        const RandomSystem::Guard& g = system_->guards_of[i];
+        Real out = sign_ * g.of_time;
+        for (std::size_t c = 0; c < 3; ++c) out += g.a[c] * rate[c];
+        return out;
+    }
+
+    [[nodiscard]] const RandomSystem::Reset& reset_of(std::size_t i) const
+    {
+        return i == no_guard ? system_->clock.reset : system_->guards_of[i].reset;
+    }
+    /// Applies one reset to a state and a mode.
+    void apply(std::size_t i, Point& x, Mode& mode) const
+    {
+        const RandomSystem::Reset& reset = reset_of(i);
+        for (std::size_t c = 0; c < 3; ++c) {
+            const Write& write = reset.writes[c];
+            if (write.kind == Write::keep) continue;
+            x[c] = write.kind == Write::put ? Real(write.value) : write.value * x[c];
+        }
+        if (reset.switches) mode = reset.next;
+    }
+
+    /// Whether member i still has its event where others have been reset first.
+    [[nodiscard]] bool still_moves(std::size_t i, Mode mode, const Point& x)
+    {
+        const Real rate = rate_of(i, flow(mode, x));
+        if (std::fabs(rate) < clearly) give_up();
+        return (sides_[i] == Side::above) == (rate > 0);
+    }
+
+    /// The set's resets: those that share a component one after the other, in every order.
+    void reset(const Guards& guards, bool on_time)
+    {
+        Guards members = guards;
+        if (on_time) members.push_back(no_guard);
+        const Point before = run_.x;
         const Mode mode = run_.mode;
+        left_ = flow(mode, before);
         std::array<std::optional<Write>, 3> writes;
+        std::array<int, 3> writers{};
         std::optional<Mode> next;
-        const auto add = [&](const RandomSystem::Reset& reset) {
+        bool modes_differ = false;
+        for (const std::size_t i : members) {
+            Point x = before;
+            Mode after = mode;
+            apply(i, x, after);
             for (std::size_t c = 0; c < 3; ++c) {
-                const Write& write = reset.writes[c];
-                if (write.kind == Write::keep) continue;
-                if (writes[c] && *writes[c] != write) give_up();
-                writes[c] = write;
-                run_.x[c] = write.kind == Write::put ? Real(write.value) : write.value * before[c];
+                if (reset_of(i).writes[c].kind != Write::keep) writes[c] = reset_of(i).writes[c];
+                if (x[c] == before[c]) continue;
+                ++writers[c];
+                run_.x[c] = x[c];
             }
-            if (!reset.switches || reset.next == mode) return;
-            if (next && *next != reset.next) give_up();
-            next = reset.next;
-        };
-        if (on_time) add(system_->clock.reset);
-        for (const std::size_t i : members) add(system_->guards_of[i].reset);
+            if (after == mode) continue;
+            modes_differ = modes_differ || (next && *next != after);
+            next = after;
+        }
         run_.mode = next.value_or(mode);
+        Guards sharing;
+        for (const std::size_t i : members) {
+            Point x = before;
+            Mode after = mode;
+            apply(i, x, after);
+            bool shares = modes_differ && after != mode;
+            for (std::size_t c = 0; c < 3; ++c) shares |= writers[c] > 1 && x[c] != before[c];
+            if (shares) sharing.push_back(i);
+        }
+        if (!sharing.empty()) reset_in_every_order(sharing, before, mode);
         if (on_time) record(no_guard, EventKind::time);
-        for (const std::size_t i : members) record(i, EventKind::crossing);
+        for (const std::size_t i : guards) record(i, EventKind::crossing);
         disturb(writes);
+    }
+
+    void reset_in_every_order(Guards members, const Point& before, Mode mode)
+    {
+        if (members.size() > 4) return give_up();
+        std::sort(members.begin(), members.end());
+        std::vector<Point> ends;
+        std::vector<Mode> modes;
+        std::vector<std::vector<Point>> added(system_->guard_count() + 1);
+        do {
+            Point x = before;
+            Mode in = mode;
+            for (const std::size_t i : members) {
+                if (i != no_guard && !system_->enabled(i, in)) continue;
+                Point y = x;
+                Mode after = in;
+                apply(i, y, after);
+                Point more;
+                for (std::size_t c = 0; c < 3; ++c) more[c] = y[c] - x[c];
+                added[i == no_guard ? added.size() - 1 : i].push_back(more);
+                if (i != no_guard && i != members.front() && !still_moves(i, in, x)) continue;
+                x = y;
+                in = after;
+            }
+            ends.push_back(x);
+            modes.push_back(in);
+        } while (std::next_permutation(members.begin(), members.end()));
+        const auto is_one = [](Real a, Real b) {
+            return std::fabs(a - b) <= 1e-15L * (1 + std::fabs(a));
+        };
+        for (std::size_t c = 0; c < 3; ++c) {
+            bool additive = true, one_end = true;
+            Real sum = before[c];
+            for (const auto& of_one : added) {
+                if (of_one.empty()) continue;
+                for (const Point& more : of_one) additive &= is_one(of_one[0][c], more[c]);
+                sum += of_one[0][c];
+            }
+            for (const Point& end : ends) one_end &= is_one(ends[0][c], end[c]);
+            if (!additive && !one_end) return give_up();
+            if (additive ? sum != before[c] : true) run_.x[c] = additive ? sum : ends[0][c];
+        }
+        for (const Mode end : modes) {
+            if (end != modes[0]) return give_up();
+        }
+        if (modes[0] != mode) run_.mode = modes[0];
     }
 
     /// Arms every guard; those that the reset has flipped fire next.
@@ -292,6 +397,10 @@ private:
             if (on_surface && before == Side::plateau) give_up();
             sides_[i] = side_of(static_cast<double>(on_surface ? g.c[1] : g.c[0]));
             const bool now = std::find(members.begin(), members.end(), i) != members.end();
+            if (on_surface && (now || run_.mode != mode_left_) && leaves_at_once(i)) {
+                flipped.push_back(i);
+                continue;
+            }
             if (now || before == Side::plateau || sides_[i] == before) continue;
             if (!counts(before, info(i).crossing)) continue;
             if (acts(i)) {
@@ -301,6 +410,16 @@ private:
             }
         }
         return flipped;
+    }
+
+    /// Whether guard i moves in its direction along the new flow, and did not along the one left.
+    [[nodiscard]] bool leaves_at_once(std::size_t i)
+    {
+        if (!acts(i) || info(i).crossing == Crossing::either) return false;
+        if (!counts(opposite(sides_[i]), info(i).crossing)) return false;
+        const Real rate = rate_of(i, left_);
+        if (std::fabs(rate) < clearly) give_up();
+        return (sides_[i] == Side::above) != (rate > 0);
     }
 
     void record(std::size_t guard, EventKind kind)
@@ -327,6 +446,8 @@ private:
     Real sign_;  ///< of the run's direction in time
     Real t_;
     Real t_end_;
+    Point left_{};  ///< x' before the resets of the last set
+    Mode mode_left_ = 0;
     double clock_;  ///< [s] the last time event, or the start
     std::vector<Side> sides_;
     Guards fired_;  ///< at this instant

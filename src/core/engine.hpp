@@ -39,9 +39,9 @@ namespace ricochet::detail {
 /// One of the sets that follow each other at an instant.
 template <class X>
 struct Cascade {
-    X x{};
+    X x;
     Mode mode = 0;
-    std::vector<std::size_t> fired;
+    boost::container::small_vector<std::size_t, 8> fired{};
 
     [[nodiscard]] bool is(const X& other, Mode in, std::span<const std::size_t> set) const
     {
@@ -81,7 +81,8 @@ protected:
           bank_(system_, BankRules::of(setup.detector, system_), backward_),
           search_(x0, bank_.size(), finders_, resolution_),
           resets_(x0),
-          left_rate_(x0)
+          left_rate_(x0),
+          cascade_{x0}
     {
         const Screening screening = setup.detector.screening;
         on_series_ = step_.has_guard_series() && !defers_ && !predicts_ &&

@@ -184,10 +184,11 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
     if (rounded) record.band = std::fabs(g);
     bool on_surface = rounded || std::fabs(g) <= band;
     Side side = on_surface ? heading(i) : side_of(g);
-    bool leaves = on_surface && leaves_at_once(i, side);
+    const Crossing crossing = record.info.crossing;
+    bool leaves = on_surface && counts(opposite(side), crossing) && leaves_at_once(i, side);
     if (!on_surface && changed_mode_ && stays_within_rounding(i)) {
         const Side head = heading(i);
-        leaves = leaves_at_once(i, head);
+        leaves = counts(opposite(head), crossing) && leaves_at_once(i, head);
         if (leaves) {
             record.band = std::fabs(g);
             on_surface = true;
@@ -238,7 +239,6 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
         return false;
     }
     if (record.info.boolean || record.info.crossing == Crossing::either) return false;
-    if (!counts(opposite(side), record.info.crossing)) return false;
     if (!changed_mode_ && !(record.fired && resets_any_ && record.info.resets)) return false;
     const X& left = search_.before();
     if (left.size() != step_.x0().size()) return false;

@@ -49,7 +49,10 @@ public:
     void apply(const SystemAt<X>& system, const Bank& bank, const FiredSet& set, const X& before,
                const Stands& stands)
     {
-        const auto& [fired, on_time, mode, t] = set;
+        const std::span<const std::size_t> fired = set.fired;
+        const bool on_time = set.on_time;
+        const Mode mode = set.mode;
+        const double t = set.t;
         assign(after_, before);
         mode_ = mode;
         conflict_ = {no_guard, no_guard};
@@ -59,13 +62,14 @@ public:
             mode_ = system->reset(system.door(), i, mode, t, after_);
             return;
         }
-        members_.clear();
-        for (const std::size_t i : fired) {
-            if (system->resets() && bank[i].info.resets) members_.push_back({.who = i});
-        }
-        if (system->reset_set && !members_.empty()) {
+        const auto resets = [&](std::size_t i) { return system->resets() && bank[i].info.resets; };
+        if (system->reset_set && std::any_of(fired.begin(), fired.end(), resets)) {
             mode_ = system->reset_set(system.door(), FiredGuards(fired, on_time), mode, t, after_);
             return;
+        }
+        members_.clear();
+        for (const std::size_t i : fired) {
+            if (resets(i)) members_.push_back({.who = i});
         }
         if (on_time && system->timed()) members_.push_back({.who = time_event_reset});
         const auto reset = [&](const Member& member, Mode in, X& x) {

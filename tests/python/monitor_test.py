@@ -60,8 +60,9 @@ def test_scipys_stepper_with_its_dense_output_has_the_impacts_of_a_ball():
             verdict = monitor.resume(host.h_abs, host.f)
     exact = [ball.impact_time(n, 10.0) for n in range(13)]
     # The host's interpolant is a function of the time, whose neighbours are 4e-15 s apart at 20 s:
-    # each of 13 flights may begin that much off, twice.
-    assert np.abs(monitor.events["t"] - exact).max() < 26 * 4e-15
+    # each of 13 flights may begin that much off, twice, and end as much later where its condition
+    # holds.
+    assert np.abs(monitor.events["t"] - exact).max() < 52 * 4e-15
     assert monitor.run.statistics.events == 13 and monitor.t == 20.5
     assert monitor.events["kind"].tolist() == [Kind.CROSSING] * 13
 
