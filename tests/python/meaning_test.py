@@ -1,0 +1,137 @@
+"""What an event means at its borders: the condition, sets, modes left at once, variables outside."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ricochet
+
+
+def event(function, reset, direction=-1):
+    function.reset = reset
+    function.direction = direction
+    return function
+
+
+def solve(flow, t_end, y0, events, **more):
+    return ricochet.solve_ivp(flow, (0, t_end), y0, events=events, rtol=1e-10, atol=1e-12, **more)
+
+
+@pytest.mark.parametrize("method", ["dopri5", "fehlberg78"])
+@pytest.mark.parametrize("locator", ["newton", "bisection"])
+def test_a_thermostat_that_reads_its_temperature_again_stays_in_its_band(method, locator):
+    class Room(ricochet.System):
+        modes = 2
+
+        def flow(self, mode, t, x):
+            return [-0.1 * (x[0] - (30 if mode else 0))]
+
+        def guard(self, mode, t, x):
+            return 17 - x[0] if mode else x[0] - 15.5
+
+        def reset(self, mode, t, x):
+            return 1 if x[0] <= 15.5 else 0 if x[0] >= 17 else mode
+
+    run = ricochet.integrate(Room(), [15.75], 48.0, rtol=1e-10, atol=1e-12, method=method,
+                             locator=locator)
+    assert len(run.events) == 48 and run.mode == 0
+    assert abs(run.events["t"][-1] - 47.6136971152) < 1e-6
+    assert abs(run.x[0] - 16.3558078684) < 1e-6
+
+
+def test_the_state_before_has_left_its_side():
+    seen = []
+
+    def floor(level):
+        def reset(t, y):
+            seen.append(y[0] - level)
+            return [y[0], -0.5 * y[1]]
+
+        return event(lambda t, y: y[0] - level, reset)
+
+    for k in range(50):
+        level = 10.0 ** (0.2 * k - 5) * (1 + 0.3 * math.sin(12.9898 * k))
+        solve(lambda t, y: [y[1], -1.0], 3 * math.sqrt(level), [2 * level, 0.0], floor(level))
+    assert len(seen) >= 50 and max(seen) <= 0
+
+
+def test_two_doses_at_one_time_are_two_doses():
+    doses = [event(lambda t, y: 2.95 - t, lambda t, y: [y[0] + 2]) for _ in range(2)]
+    result = solve(lambda t, y: [-y[0]], 10, [1.0], doses)
+    expected = math.exp(-10) + 4 * math.exp(-7.05)
+    assert abs(result.y[0, -1] - expected) < 1e-9
+    halves = [event(lambda t, y: 1 - t, lambda t, y: [y[0] / 2]) for _ in range(2)]
+    assert solve(lambda t, y: [0.0], 2, [8.0], halves).y[0, -1] == 2
+
+
+def test_resets_whose_order_matters_conflict():
+    events = [event(lambda t, y: 1 - t, lambda t, y: [-3.5]),
+              event(lambda t, y: 1 - t, lambda t, y: [y[0] + 1])]
+    for both in (events, events[::-1]):
+        result = solve(lambda t, y: [0.0], 2, [-4.5], both)
+        assert not result.success and "order" in result.message
+
+
+def test_events_that_change_a_variable_of_the_flow_or_of_the_event_cut_the_step():
+    k = [1.0]
+
+    def toggle(t, y):
+        k[0] = 0.25 if k[0] == 1 else 1.0
+        return y
+
+    # A quarter of a period at k = 1 ends at y = 0 with the speed 1, where k becomes 1/4: half a
+    # period of 2 pi later the speed is 1 again.
+    result = solve(lambda t, y: [y[1], -k[0] * y[0]], 2.5 * math.pi, [1.0, 0.0],
+                   event(lambda t, y: y[0], toggle, 0))
+    np.testing.assert_allclose(result.t_events[0], [math.pi / 2, 2.5 * math.pi], atol=1e-8)
+
+    level = [1.0]
+
+    def raise_level(t, y):
+        level[0] += 1
+        return y
+
+    result = solve(lambda t, y: [1.0], 10.5, [0.0], event(lambda t, y: level[0] - y[0], raise_level))
+    np.testing.assert_allclose(result.t_events[0], np.arange(1, 11), atol=1e-12)
+
+
+def test_a_relay_is_reported_and_not_passed_over():
+    class Relay(ricochet.System):
+        modes = 2
+
+        def flow(self, mode, t, x):
+            return [1.0 if mode else -1.0]
+
+        def guard(self, mode, t, x):
+            return -x[0] if mode else x[0]
+
+        def reset(self, mode, t, x):
+            return 1 - mode
+
+    run = ricochet.integrate(Relay(), [1.0], 3.0)
+    assert run.outcome == "endless_cascade"
+    assert abs(run.t - 1) < 1e-14 and len(run.events) <= 8
+
+
+def test_a_reset_that_declines_is_counted():
+    class Wall(ricochet.System):
+        modes = 2
+        acts = True
+
+        def flow(self, mode, t, x):
+            return [-1.0]
+
+        def guard(self, mode, t, x):
+            return x[0]
+
+        def reset(self, mode, t, x):
+            return 1 if self.acts and x[0] < 0 else mode
+
+    for acts in (True, False):
+        wall = Wall()
+        wall.acts = acts
+        run = ricochet.integrate(wall, [1.0], 2.0)
+        assert len(run.events) == 1 and run.mode == acts
+        assert run.statistics.ineffective_resets == (not acts)
+        assert run.statistics.unmet_conditions == 0
