@@ -1,0 +1,175 @@
+/* What an event means at its borders: the condition, sets, modes that are left at once. */
+#include <math.h>
+
+#include "check.h"
+
+static rc_simulation* run_from(const rc_callbacks* callbacks, double start, double t_end)
+{
+    rc_options options;
+    rc_system* system;
+    rc_simulation* simulation;
+    CHECK_STATUS(RC_OK, rc_options_default(&options, sizeof options));
+    options.t_end = t_end;
+    options.rtol = 1e-10;
+    options.atol = 1e-12;
+    CHECK_STATUS(RC_OK, rc_system_new(callbacks, &system));
+    CHECK_STATUS(RC_OK, rc_simulation_new(system, &start, 1, &options, &simulation));
+    rc_system_free(system);
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    return simulation;
+}
+
+static rc_callbacks callbacks_of(rc_flow_fn flow, rc_guard_fn guard, rc_reset_fn reset)
+{
+    rc_callbacks callbacks;
+    memset(&callbacks, 0, sizeof callbacks);
+    callbacks.size = sizeof callbacks;
+    callbacks.dimension = 1;
+    callbacks.guard_count = 1;
+    callbacks.flow = flow;
+    callbacks.guard = guard;
+    callbacks.reset = reset;
+    return callbacks;
+}
+
+static rc_statistics statistics_of(rc_simulation* simulation)
+{
+    rc_statistics statistics;
+    statistics.size = sizeof statistics;
+    CHECK_STATUS(RC_OK, rc_get_statistics(simulation, &statistics));
+    return statistics;
+}
+
+/* A room that heats below 15.5 and stops above 17, and reads its temperature again. */
+
+static int room_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+{
+    (void)user, (void)t, (void)n;
+    dxdt[0] = -0.1 * (x[0] - (mode ? 30 : 0));
+    return 0;
+}
+
+static int room_guard(void* user, size_t which, rc_mode mode, double t, const double* x, size_t n,
+                      double* g)
+{
+    (void)user, (void)which, (void)t, (void)n;
+    *g = mode ? 17 - x[0] : x[0] - 15.5;
+    return 0;
+}
+
+static int room_reset(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n)
+{
+    (void)user, (void)which, (void)t, (void)n;
+    if (x[0] <= 15.5) *mode = 1;
+    if (x[0] >= 17) *mode = 0;
+    return 0;
+}
+
+static void a_room_stays_in_its_band(void)
+{
+    rc_callbacks callbacks = callbacks_of(room_flow, room_guard, room_reset);
+    rc_simulation* simulation;
+    callbacks.mode_count = 2;
+    simulation = run_from(&callbacks, 15.75, 48);
+    CHECK(rc_event_count(simulation) == 48);
+    CHECK(rc_mode_now(simulation) == 0);
+    CHECK(fabs(rc_state(simulation)[0] - 16.3558078684) < 1e-6);
+    CHECK(statistics_of(simulation).unmet_conditions == 0);
+    rc_simulation_free(simulation);
+}
+
+/* A relay: each mode drives the state back over the surface that it has just left. */
+
+static int relay_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+{
+    (void)user, (void)t, (void)x, (void)n;
+    dxdt[0] = mode ? 1 : -1;
+    return 0;
+}
+
+static int relay_guard(void* user, size_t which, rc_mode mode, double t, const double* x, size_t n,
+                       double* g)
+{
+    (void)user, (void)which, (void)t, (void)n;
+    *g = mode ? -x[0] : x[0];
+    return 0;
+}
+
+static int toggle(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n)
+{
+    (void)user, (void)which, (void)t, (void)x, (void)n;
+    *mode = 1 - *mode;
+    return 0;
+}
+
+static void a_relay_is_reported(void)
+{
+    rc_callbacks callbacks = callbacks_of(relay_flow, relay_guard, toggle);
+    rc_simulation* simulation;
+    callbacks.mode_count = 2;
+    simulation = run_from(&callbacks, 1, 3);
+    CHECK(rc_outcome(simulation) == RC_ENDLESS_CASCADE);
+    CHECK(fabs(rc_time(simulation) - 1) < 1e-14);
+    rc_simulation_free(simulation);
+}
+
+/* Two doses at one time, and two resets whose order matters. */
+
+static int decay(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+{
+    (void)user, (void)mode, (void)t, (void)n;
+    dxdt[0] = -x[0];
+    return 0;
+}
+
+static int until_2_95(void* user, size_t which, rc_mode mode, double t, const double* x, size_t n,
+                      double* g)
+{
+    (void)user, (void)which, (void)mode, (void)x, (void)n;
+    *g = 2.95 - t;
+    return 0;
+}
+
+static int dose(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)n;
+    x[0] += 2;
+    return 0;
+}
+
+static int set_or_add(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n)
+{
+    (void)user, (void)mode, (void)t, (void)n;
+    if (which == 0) {
+        x[0] = -3.5;
+    } else {
+        x[0] += 1;
+    }
+    return 0;
+}
+
+static void resets_of_a_common_component_follow_each_other(void)
+{
+    rc_callbacks callbacks = callbacks_of(decay, until_2_95, dose);
+    rc_simulation* simulation;
+    rc_statistics statistics;
+    callbacks.guard_count = 2;
+    simulation = run_from(&callbacks, 1, 10);
+    CHECK(fabs(rc_state(simulation)[0] - (exp(-10) + 4 * exp(-7.05))) < 1e-9);
+    rc_simulation_free(simulation);
+
+    callbacks.reset = set_or_add;
+    simulation = run_from(&callbacks, -4.5, 10);
+    CHECK(rc_outcome(simulation) == RC_CONFLICTING_RESETS);
+    statistics = statistics_of(simulation);
+    CHECK(statistics.guard == 0 && statistics.other_guard == 1);
+    rc_simulation_free(simulation);
+}
+
+int main(void)
+{
+    a_room_stays_in_its_band();
+    a_relay_is_reported();
+    resets_of_a_common_component_follow_each_other();
+    return 0;
+}
