@@ -158,6 +158,11 @@ inline void EventEngine<X, single>::record_notes(double s)
     for (const Note& note : search_.notes()) {
         const double t = backward_ ? std::max(step_.time(note.where.root), latest)
                                    : std::min(step_.time(note.where.root), latest);
+        if (note.kind == EventKind::touch && system_->enabled_at &&
+            !system_.enabled_at(note.guard, step_.mode(), t, search_.state_at(step_, note))) {
+            ++run_.statistics.disabled;
+            continue;
+        }
         count_event(note.guard, t, note.side);
         bank_[note.guard].returned = note.kind == EventKind::touch;
         if (!options_.record_events) continue;

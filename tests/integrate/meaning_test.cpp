@@ -671,6 +671,97 @@ TEST(Meaning, AResetThatDeclinesOnItsSurfaceIsAskedBeyondIt)
     });
 }
 
+// --- vetoes ---
+
+/// A parabola that touches its surface at t = 1 and crosses it where it is shifted down.
+struct Vetoed {
+    using State = Array<1>;
+    double until = 2;
+
+    void flow(double t, const State&, State& dxdt) const { dxdt[0] = 2 * (t - 1); }
+    [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
+    [[nodiscard]] bool enabled(double t, const State&) const { return t > until; }
+    [[nodiscard]] GuardInfo guard_info() const { return {.resets = false, .touch = 1e-12}; }
+};
+
+TEST(Meaning, ATouchOfADisabledGuardIsCountedAndNotRecorded)
+{
+    for (const double until : {0.0, 1.5}) {
+        const Vetoed system{.until = until};
+        by_all(system, Array<1>{1}, {.t_end = 1.75},
+               [&](const auto& run, const std::string& label) {
+                   if (label.ends_with("ends")) return;  // which does not look for touches
+                   EXPECT_EQ(run.events.size(), until == 0 ? 1U : 0U) << label;
+                   EXPECT_EQ(run.statistics.disabled, until == 0 ? 0U : 1U) << label;
+                   if (until == 0) {
+                       EXPECT_EQ(run.events[0].kind, EventKind::touch) << label;
+                   }
+               });
+    }
+}
+
+// --- runs that follow each other ---
+
+TEST(Meaning, ARunThatStartsBeforeItsSurfaceByARoundingHasItsEvent)
+{
+    Machine<Array<1>> ramp;
+    ramp.f = [](Mode, double, const auto&, auto& dxdt) { dxdt[0] = 1; };
+    ramp.g = [](std::size_t, Mode, double, const auto& x) { return 1 - x[0]; };
+    ramp.r = [](std::size_t, Mode, double, auto&) -> Mode { return 1; };
+    ramp.on = [](std::size_t, Mode m) { return m == 0; };
+    by_all(ramp, Array<1>{1 - 0x1p-53}, {.t_end = 1},
+           [](const auto& run, const std::string& label) {
+               EXPECT_EQ(run.events.size(), 1U) << label;
+           });
+}
+
+TEST(Meaning, RunsThatFollowEachOtherLoseAndDoubleNothing)
+{
+    // x' = 0.07 in runs of one second each: the surfaces 0.07 m lie at their joints, by rounding
+    // before them or behind.
+    Machine<Array<1>> ramp;
+    ramp.guard_count_ = 399;
+    ramp.f = [](Mode, double, const auto&, auto& dxdt) { dxdt[0] = 0.07; };
+    ramp.g = [](std::size_t i, Mode, double, const auto& x) {
+        return 0.07 * static_cast<double>(i + 2) - x[0];
+    };
+    ramp.r = [](std::size_t, Mode m, double, auto&) { return m; };
+    std::vector<int> count(399);
+    Array<1> x{0};
+    for (int k = 0; k < 402; ++k) {
+        const auto run = integrate(ramp, x, {.t_start = 1.0 * k, .t_end = 1.0 * (k + 1)});
+        for (const auto& event : run.events) ++count[event.guard];
+        x = run.x;
+    }
+    EXPECT_EQ(std::count(count.begin(), count.end(), 1), 399);
+}
+
+TEST(Meaning, ALoopOfRestartsAfterTerminalEventsEnds)
+{
+    // A ball whose impacts end the run, and are applied outside.
+    Machine<Array<2>> ball;
+    ball.f = [](Mode, double, const auto& x, auto& dxdt) { dxdt = {x[1], -9.81}; };
+    ball.g = [](std::size_t, Mode, double, const auto& x) { return x[0] - 1; };
+    ball.r = [](std::size_t, Mode m, double, auto&) { return m; };
+    ball.info.stop_after = 1;
+    double t = 0;
+    Array<2> x{3, 0};
+    int restarts = 0;
+    while (t < 1500) {
+        const auto run = integrate(ball, x, {.t_start = t, .t_end = 1500});
+        if (run.outcome == Outcome::reached_end) break;
+        ASSERT_EQ(run.outcome, Outcome::stopped_by_event);
+        ASSERT_LE(run.x[0], 1);
+        ASSERT_GT(run.t, t);
+        t = run.t;
+        x = {run.x[0], -run.x[1]};
+        ASSERT_LT(++restarts, 2000);
+    }
+    // Flights of 2 sqrt(2 * 2 / g), the first a half.
+    const double flight = 2 * std::sqrt(4 / 9.81);
+    EXPECT_EQ(restarts, static_cast<int>(std::floor(1500 / flight + 0.5)));
+}
+
 // --- cascades ---
 
 /// A row of cells that each pass on more than they can hold, x_0 fed from outside.
