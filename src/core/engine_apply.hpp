@@ -75,7 +75,7 @@ inline void EventEngine<X, single>::find_band(std::size_t i, double t)
                        search_.at() == where.root && !search_.late();
     const double g = search_.value_at_set(i);
     record.band = record.estimated ? std::max(residue, bank_.touch(i, step_.h()))
-                  : g == g         ? std::fabs(g)
+                  : g == g         ? g
                                    : tolerance_of(i, t);
 }
 

@@ -215,11 +215,14 @@ public:
         return lost_from(step, straight_from_, space_.x, space_.dxdt, c);
     }
 
-    /// The guard at the set, where `meet_conditions` has evaluated it; else NaN.
+    /// The larger |g| at the set and where it was before `meet_conditions` has moved it; NaN where
+    /// that has not evaluated the guard.
     [[nodiscard]] double value_at_set(std::size_t i) const noexcept
     {
         for (const Hit& hit : hits_) {
-            if (hit.guard == i && values_known_) return hit.value;
+            if (hit.guard == i && values_known_) {
+                return std::max(std::fabs(hit.value), hit.at_root);
+            }
         }
         return std::numeric_limits<double>::quiet_NaN();
     }
@@ -699,9 +702,9 @@ private:
     [[nodiscard]] double window_end(const CurrentStep& step) noexcept;
 
     /// The longest time [s] after which a guard of the set that has not left its side at the state
-    /// x reaches its surface there, `ahead` after the set; 0 if there is none, NaN if it cannot be
+    /// x reaches its surface there, at the offset `at`; 0 if there is none, NaN if it cannot be
     /// told.
-    [[nodiscard]] double lacks(const CurrentStep& step, Bank& bank, const X& x, double ahead,
+    [[nodiscard]] double lacks(const CurrentStep& step, Bank& bank, const X& x, const TwoSum& at,
                                std::uint64_t& calls);
 
     /// The set happens at its latest root, or at the time event that it belongs to.

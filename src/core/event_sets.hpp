@@ -118,9 +118,9 @@ inline void EventSearch<X, single>::settle_place(const CurrentStep& step, bool t
 
 template <class X, bool single>
 inline double EventSearch<X, single>::lacks(const CurrentStep& step, Bank& bank, const X& x,
-                                            double ahead, std::uint64_t& calls)
+                                            const TwoSum& at, std::uint64_t& calls)
 {
-    const double t = step.instant(at_, at_remainder_ + ahead).value;
+    const double t = step.instant(at.value, at.remainder).value;
     double longest = 0;
     for (const std::size_t i : fired_) {
         for (Hit& hit : hits_) {
@@ -141,8 +141,9 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
                                                     std::uint64_t& calls)
 {
     if (late_) return true;
-    double wait = lacks(step, bank, before_, 0, calls);
+    double wait = lacks(step, bank, before_, {at_, at_remainder_}, calls);
     values_known_ = wait == 0;
+    for (Hit& hit : hits_) hit.at_root = hit.located ? std::fabs(hit.value) : 0;
     if (values_known_) return true;
     double far = at_;
     for (const Hit& hit : hits_) {
@@ -154,9 +155,9 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
     keep_rate(step);
     X& x = space_.root;
     const auto holds = [&](double ahead) {
-        values_known_ = all_finite(x) && lacks(step, bank, x, ahead, calls) == 0;
-        if (!values_known_) return false;
         const TwoSum at = two_sum(at_, at_remainder_ + ahead);
+        values_known_ = all_finite(x) && lacks(step, bank, x, at, calls) == 0;
+        if (!values_known_) return false;
         at_ = at.value;
         at_remainder_ = at.remainder;
         if (has_lost_) {
