@@ -10,6 +10,7 @@
 #pragma once
 
 #include <algorithm>
+#include <boost/container/small_vector.hpp>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -473,6 +474,8 @@ protected:
     }
     /// Whether guard i is so near to its surface at x⁻ and x⁺ that only rounding tells its side.
     [[nodiscard]] bool stays_within_rounding(std::size_t i);
+    /// Whether guard i is as near to its surface at the start of the step as rounding moves it.
+    [[nodiscard]] bool lies_within_rounding(std::size_t i);
 
     /// Side that a guard on its surface is about to enter.
     [[nodiscard]] Side heading(std::size_t i);

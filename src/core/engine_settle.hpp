@@ -270,11 +270,7 @@ bool EventEngine<X, single>::stays_within_rounding(std::size_t i)
 {
     const GuardRecord& record = bank_[i];
     if (!record.acting || record.fired || record.newly_enabled || record.info.boolean) return false;
-    const double g = std::fabs(bank_.g0(i));
-    const double rate = bank_.complete_rate0(i, step_, h_next_, calls());
-    const double moves = std::fabs(rate) * (std::fabs(step_.time(0)) + h_next_);
-    if (!(g <= 0x1p-20 * std::max(bank_.armed_scale(i, h_next_), moves))) return false;
-    return g <= rounding_of(i);
+    return lies_within_rounding(i);
 }
 
 template <class X, bool single>
@@ -285,6 +281,13 @@ inline bool EventEngine<X, single>::is_flipped_by_rounding(std::size_t i, Side b
     if (record.fired || record.newly_enabled || record.info.boolean) return false;
     if (before == Side::plateau || side_of(g) != opposite(before)) return false;
     // Otherwise the reset of another guard has carried it across, by more than rounding.
+    return lies_within_rounding(i);
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::lies_within_rounding(std::size_t i)
+{
+    const double g = bank_.g0(i);
     const double rate = system_->bounded ? bank_.complete_rate0(i, step_, h_next_, calls())
                                          : bank_.rate0(i);  // which may not be known otherwise
     const double moves = std::fabs(rate) * (std::fabs(step_.time(0)) + h_next_);

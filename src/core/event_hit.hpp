@@ -72,7 +72,6 @@ struct Hit {
     double guess = 0;       ///< [s] estimated offset of the root
     bool departed = false;  ///< it is to be located
     double value = 0;       ///< else the guard at the end of the window
-    double at_root = 0;     ///< |g| at the set before it was moved to where its conditions hold
     bool located = false;
     Location where;
 };

@@ -215,14 +215,11 @@ public:
         return lost_from(step, straight_from_, space_.x, space_.dxdt, c);
     }
 
-    /// The larger |g| at the set and where it was before `meet_conditions` has moved it; NaN where
-    /// that has not evaluated the guard.
+    /// Value |g| at the set, where `meet_conditions` has evaluated the guard; else NaN.
     [[nodiscard]] double value_at_set(std::size_t i) const noexcept
     {
         for (const Hit& hit : hits_) {
-            if (hit.guard == i && values_known_) {
-                return std::max(std::fabs(hit.value), hit.at_root);
-            }
+            if (hit.guard == i && values_known_) return std::fabs(hit.value);
         }
         return std::numeric_limits<double>::quiet_NaN();
     }

@@ -143,7 +143,6 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
     if (late_) return true;
     double wait = lacks(step, bank, before_, {at_, at_remainder_}, calls);
     values_known_ = wait == 0;
-    for (Hit& hit : hits_) hit.at_root = hit.located ? std::fabs(hit.value) : 0;
     if (values_known_) return true;
     double far = at_;
     for (const Hit& hit : hits_) {

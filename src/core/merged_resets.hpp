@@ -40,7 +40,7 @@ struct FiredSet {
 template <class X>
 class MergedResets {
 public:
-    explicit MergedResets(const X& like) : after_(like), single_(like) {}
+    explicit MergedResets(const X& like) : after_(like), single_(like), along_(like) {}
 
     /// Applies the resets of the guards that fired to the state `before`, and the reset of a time
     /// event. `bank` knows which guards have a reset.
@@ -67,11 +67,11 @@ public:
             mode_ = system->reset_set(system.door(), FiredGuards(fired, on_time), mode, t, after_);
             return;
         }
-        members_.clear();
+        members_ = {};
         for (const std::size_t i : fired) {
-            if (resets(i)) members_.push_back({.who = i});
+            if (resets(i)) add_member(i);
         }
-        if (on_time && system->timed()) members_.push_back({.who = time_event_reset});
+        if (on_time && system->timed()) add_member(time_event_reset);
         const auto reset = [&](const Member& member, Mode in, X& x) {
             return member.who == time_event_reset
                        ? system->time_reset(system.door(), in, t, x)
@@ -132,9 +132,9 @@ private:
     };
 
     struct Member {
-        std::size_t who;  ///< a guard, or `time_event_reset`
-        Mode mode = 0;    ///< after its reset of the state before
-        X result{};       ///< the state after that
+        std::size_t who = no_guard;  ///< a guard, or `time_event_reset`
+        Mode mode = 0;               ///< after its reset of the state before
+        X result{};                  ///< the state after that
         bool shares = false;
         double rounding = 0;  ///< of the components that it changes
         std::vector<Range> increments{};
@@ -145,12 +145,22 @@ private:
         }
     };
 
+    /// In memory that earlier sets have allocated.
+    void add_member(std::size_t who)
+    {
+        const std::size_t count = members_.size();
+        if (count == all_members_.size()) all_members_.emplace_back();
+        members_ = {all_members_.data(), count + 1};
+        members_.back().who = who;
+        members_.back().shares = false;
+    }
+
     template <class Reset, class Stands>
     void apply_together(const X& before, Mode mode, const Reset& reset, const Stands& stands)
     {
         bool resized = false;
         for (Member& member : members_) {
-            member.result = before;
+            assign(member.result, before);
             member.mode = reset(member, mode, member.result);
             resized = resized || member.result.size() != before.size();
         }
@@ -302,7 +312,8 @@ private:
     void take_in_order(std::span<const std::size_t> order, const X& before, Mode mode,
                        const Reset& reset, const Stands& stands)
     {
-        X x = before;
+        X& x = along_;
+        assign(x, before);
         Mode in = mode;
         for (const std::size_t k : order) {
             Member& member = members_[k];
@@ -332,19 +343,19 @@ private:
         for (const std::size_t k : group_) rounding = std::max(rounding, members_[k].rounding);
         for (std::size_t c = 0; c < size_of(before); ++c) {
             bool each_is_one = true;
-            std::vector<double> sum;
+            added_.clear();
             for (const std::size_t k : group_) {
                 const Range& added = members_[k].increments[c];
                 if (added.most < added.least) continue;
                 each_is_one = each_is_one && added.is_one(members_[k].rounding);
-                sum.push_back(added.least);
+                added_.push_back(added.least);
             }
             if (each_is_one) {
                 // In an order of their own, so that the declared one does not matter.
-                std::sort(sum.begin(), sum.end());
+                std::sort(added_.begin(), added_.end());
                 double value = at(before, c);
-                for (const double added : sum) value += added;
-                if (std::any_of(sum.begin(), sum.end(), [](double d) { return d != 0; })) {
+                for (const double added : added_) value += added;
+                if (std::any_of(added_.begin(), added_.end(), [](double d) { return d != 0; })) {
                     at(after_, c) = value;
                 }
                 continue;
@@ -378,7 +389,6 @@ private:
             for (std::size_t c = 0; c < size_of(before); ++c) at(x, c) = ends_[c].least;
             return last_mode_;
         };
-        const Mode merged = mode_;
         X one = before, other = before;
         for (std::size_t i = 0; i < group_.size(); ++i) {
             for (std::size_t j = i + 1; j < group_.size(); ++j) {
@@ -395,7 +405,6 @@ private:
                 return;
             }
         }
-        mode_ = merged;
     }
 
     void note_rounding(Member& member, const X& before) const
@@ -430,8 +439,11 @@ private:
     X single_;
     Mode mode_ = 0;
     std::pair<std::size_t, std::size_t> conflict_{no_guard, no_guard};
-    std::vector<Member> members_;  ///< of a set of several
+    X along_;  ///< state between the resets of one order
+    std::vector<Member> all_members_;
+    std::span<Member> members_;  ///< of a set of several
     std::vector<std::size_t> group_;
+    std::vector<double> added_;            ///< by each of the group to one component
     std::vector<Range> ends_;              ///< of every order
     Mode first_mode_ = 0, last_mode_ = 0;  ///< at the start, and at the end of the last order
     bool modes_differ_ = false;

@@ -279,9 +279,7 @@ public:
     void flow(double s, const X& x, X& dxdt) const
     {
         if (state_.host) return rate_on_host(s, dxdt);
-        ++state_.flow_calls;
-        state_.flow_fits &= system_->flow(system_.door(), state_.mode, time(s), x, dxdt);
-        if (state_.backward) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
+        flow_in(state_.mode, time(s), x, dxdt);
     }
 
     /// x' = f(t, x) in another mode, where the flow is the system's and not a host's.

@@ -1,15 +1,13 @@
 /* What an event means at its borders: the condition, sets, modes that are left at once. */
 #include <math.h>
 
-#include "check.h"
+#include "ball.h"
 
 static rc_simulation* run_from(const rc_callbacks* callbacks, double start, double t_end)
 {
-    rc_options options;
+    rc_options options = options_until(t_end);
     rc_system* system;
     rc_simulation* simulation;
-    CHECK_STATUS(RC_OK, rc_options_default(&options, sizeof options));
-    options.t_end = t_end;
     options.rtol = 1e-10;
     options.atol = 1e-12;
     CHECK_STATUS(RC_OK, rc_system_new(callbacks, &system));
@@ -21,23 +19,12 @@ static rc_simulation* run_from(const rc_callbacks* callbacks, double start, doub
 
 static rc_callbacks callbacks_of(rc_flow_fn flow, rc_guard_fn guard, rc_reset_fn reset)
 {
-    rc_callbacks callbacks;
-    memset(&callbacks, 0, sizeof callbacks);
-    callbacks.size = sizeof callbacks;
+    rc_callbacks callbacks = ball_callbacks();
     callbacks.dimension = 1;
-    callbacks.guard_count = 1;
     callbacks.flow = flow;
     callbacks.guard = guard;
     callbacks.reset = reset;
     return callbacks;
-}
-
-static rc_statistics statistics_of(rc_simulation* simulation)
-{
-    rc_statistics statistics;
-    statistics.size = sizeof statistics;
-    CHECK_STATUS(RC_OK, rc_get_statistics(simulation, &statistics));
-    return statistics;
 }
 
 /* A room that heats below 15.5 and stops above 17, and reads its temperature again. */
