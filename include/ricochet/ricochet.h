@@ -305,8 +305,10 @@ RC_API rc_status rc_simulation_free(rc_simulation* simulation);
  *  the run has ended, else 1. */
 RC_API rc_status rc_step(rc_simulation* simulation, int* goes_on);
 
-/** Advances to the next sample time, or to the end of the next step that holds events. Writes 0
- *  into `goes_on` if the run has ended and everything that happened has been shown, else 1. */
+/** Advances to the next sample time or event, recorded events included; what happens at one instant
+ *  is shown once. Events whose states are not kept (`event_states`) are shown at the end of their
+ *  step. Writes 0 into `goes_on` if the run has ended and everything that happened has been shown,
+ *  else 1. */
 RC_API rc_status rc_advance(rc_simulation* simulation, int* goes_on);
 
 /** Advances to the end. */
@@ -438,6 +440,17 @@ RC_API rc_status rc_save(rc_simulation* simulation, void* bytes, size_t* size);
  *  options; only the end, the sample times and what is recorded may differ. Recorded results are
  *  kept. RC_INVALID names what does not agree; then nothing has changed. */
 RC_API rc_status rc_restore(rc_simulation* simulation, const void* bytes, size_t size);
+
+/** Goes on from the `n` doubles `x` at time t in a mode, as from a start: guards are armed again,
+ * and a time event at t belongs to the past. t may be any time from t_start to before t_end, also
+ * one at which rc_advance has stopped inside a step; what was recorded after it is dropped. A run
+ * that has ended goes on. RC_INVALID if t lies outside of the run, or rc_simulation_new would
+ * refuse such a start; then, and after RC_CALLBACK, nothing has changed. */
+RC_API rc_status rc_restart(rc_simulation* simulation, double t, const double* x, size_t n,
+                            rc_mode mode);
+/** Moves the end of the run to `t_end`. A run that has reached its end goes on. RC_INVALID if it
+ *  does not lie ahead of the last step; then nothing has changed. */
+RC_API rc_status rc_extend(rc_simulation* simulation, double t_end);
 
 /* --- monitors ---------------------------------------------------------------------------- */
 

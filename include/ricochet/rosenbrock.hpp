@@ -156,10 +156,12 @@ struct RosenbrockRoom {
         : x(like),
           rate(like),
           by_time(like),
+          alone(like),
           at(like),
           flow(like),
           increment(like),
           error(like),
+          steady(like),
           start_gap(like),
           end_gap(like),
           bend(like)
@@ -180,10 +182,14 @@ struct RosenbrockRoom {
     bool backward = false;
     bool known = false;
     C x, rate, by_time;  ///< f and df/ds
+    C alone;             ///< 1 for components whose rate has no derivative
     Numbers<double, n * n> jacobian{};
 
     // One step from that start.
     C at, flow, increment, error;
+    /// 1 for components whose rate is the same, bit for bit, in all stages: they move by h times
+    /// it, without the rounding of the coefficients.
+    C steady;
     std::array<C, 5> stages;
     Numbers<double, n * n> factors{};
     Numbers<std::size_t, n> rows{};
@@ -245,7 +251,7 @@ class KernelOf<System, X, Rosenbrock4> {
     static void flow(D& door, State& state, double s, const C& x, C& rate)
     {
         ++state.flow_calls;
-        state.flow_fits &= door.flow(state.mode, state.time(s), x, rate);
+        state.flow_fits &= door.flow(state.mode, state.flow_time(s), x, rate);
         if (state.backward) {
             for_components(x, [&](auto i) { rate[i] = -rate[i]; });
         }
@@ -258,7 +264,7 @@ class KernelOf<System, X, Rosenbrock4> {
         Room& room = door.room;
         const std::span<double> rows(room.jacobian.data(), room.jacobian.size());
         const X& x = door.read(state.x0, 0);
-        const double t = state.start.value;
+        const double t = state.flow_time(0);
         if constexpr (requires { door.system().jacobian(state.mode, t, x, rows); }) {
             door.system().jacobian(state.mode, t, x, rows);
         } else {
@@ -275,7 +281,7 @@ class KernelOf<System, X, Rosenbrock4> {
         const std::size_t n = state.x0.size();
         Scratch<WithScalar<X, S>, 2> states(state.x0);
         for (std::size_t first = 0; first <= n; first += width) {
-            S time(state.start.value);
+            S time(state.flow_time(0));
             if (first <= n && n < first + width) time.slope[n - first] = 1;
             for (std::size_t i = 0; i < n; ++i) {
                 S& x = states[0][i] = S(state.x0[i]);
@@ -309,11 +315,13 @@ class KernelOf<System, X, Rosenbrock4> {
         }
     }
 
-    /// df/ds by a difference forward from the start, where the flow exists.
-    static void by_time_by_differences(D& door, State& state)
+    /// df/ds by a difference forward from the start, inside the step of length h, where the flow
+    /// exists.
+    static void by_time_by_differences(D& door, State& state, double h)
     {
         Room& room = door.room;
-        const double later = state.start.plus(state.in_time(reach_of(state.start.value)));
+        const double reach = std::min(reach_of(state.start.value), h);
+        const double later = state.start.plus(state.in_time(reach));
         const double delta = state.in_time(later - state.start.value);
         flow(door, state, delta, state.x0, room.flow);
         for_components(state.x0,
@@ -328,8 +336,9 @@ class KernelOf<System, X, Rosenbrock4> {
         return std::max(std::sqrt(epsilon * std::max(1e-5, size)), 4 * epsilon * size);
     }
 
-    /// Computes f, df/ds and J at the start of a step, unless they are known for this very start.
-    static void prepare(D& door, State& state)
+    /// Computes f, df/ds and J at the start of a step of length h, unless they are known for this
+    /// very start.
+    static void prepare(D& door, State& state, double h)
     {
         Room& room = door.room;
         bool same = room.known && room.start.value == state.start.value &&
@@ -349,14 +358,21 @@ class KernelOf<System, X, Rosenbrock4> {
         if constexpr (JacobianWritten<System, X>) {
             jacobian_written(door, state);
             turn();
-            by_time_by_differences(door, state);
+            by_time_by_differences(door, state, h);
         } else if constexpr (by_duals) {
             jacobian_by_duals(door, state);
             turn();  // but not df/ds, whose sign changes twice
         } else {
             jacobian_by_differences(door, state);
-            by_time_by_differences(door, state);
+            by_time_by_differences(door, state, h);
         }
+        for_components(state.x0, [&](auto i) {
+            const double* const row =
+                room.jacobian.data() + static_cast<std::size_t>(i) * state.x0.size();
+            const bool alone =
+                std::all_of(row, row + state.x0.size(), [](double slope) { return slope == 0; });
+            room.alone[i] = alone && room.by_time[i] == 0 ? 1 : 0;
+        });
         room.x = state.x0;
         room.start = state.start;
         room.mode = state.mode;
@@ -382,15 +398,17 @@ class KernelOf<System, X, Rosenbrock4> {
     /// Computes increment and error of a step of length h; false if it cannot be solved.
     static bool solve(D& door, State& state, double h)
     {
-        prepare(door, state);
+        prepare(door, state, h);
         Room& room = door.room;
         const std::size_t n = state.x0.size();
         if (!factorize_for(room, h)) return false;
+        assign(room.steady, room.alone);
         for (std::size_t k = 0; k < 5; ++k) {
             if (k > 0) {
                 assign(room.at, state.x0);
                 for (std::size_t j = 0; j < k; ++j) add(room.at, Table::a[k][j], room.stages[j]);
                 flow(door, state, Table::c[k] * h, room.at, room.flow);
+                note_changes(room, room.flow);
             }
             C& stage = room.stages[k];
             assign(stage, k > 0 ? room.flow : room.rate);
@@ -400,14 +418,25 @@ class KernelOf<System, X, Rosenbrock4> {
         }
         add(room.at, 1, room.stages[4]);
         flow(door, state, h, room.at, room.error);
+        note_changes(room, room.error);
         for (std::size_t j = 0; j < 5; ++j) add(room.error, Table::m[5][j] / h, room.stages[j]);
         substitute(n, room.factors.data(), room.rows.data(), room.error);
         for_components(state.x0, [&](auto i) {
             double sum = room.error[i] + room.stages[4][i];
             for (std::size_t j = 0; j < 4; ++j) sum += Table::a[4][j] * room.stages[j][i];
-            room.increment[i] = sum;
+            const bool steady = room.steady[i] != 0;
+            room.increment[i] = steady ? h * room.rate[i] : sum;
+            if (steady) room.error[i] = 0;
         });
         return true;
+    }
+
+    /// A component whose rate is no longer that at the start is not steady.
+    static void note_changes(Room& room, const C& rate)
+    {
+        for_components(rate, [&](auto i) {
+            if (!(rate[i] == room.rate[i])) room.steady[i] = 0;
+        });
     }
 
     /// Coefficient k = 1, 2, 3 of the interpolant in s, from the last step solved.
@@ -417,6 +446,7 @@ class KernelOf<System, X, Rosenbrock4> {
     template <class Index>
     [[nodiscard]] static Terms terms(const Room& room, Index i, double h) noexcept
     {
+        if (room.steady[i] != 0) return {room.rate[i], 0, 0};
         double p = 0;
         double q = 0;
         for (std::size_t j = 0; j < 5; ++j) {

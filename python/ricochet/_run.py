@@ -163,6 +163,28 @@ class Simulation(_ricochet.Simulation):
             options["dense"] = True
         source, x0, options, modes = prepare(system, x0, t_end, options)
         super().__init__(source, x0, options, modes)
+        self._of = system, modes
+
+    def restart(self, t, x, mode=None):
+        """Goes on from state ``x`` at time ``t`` in a mode (default: the present one), as from a start.
+
+        Guards are armed and the first step is estimated again, and a time event at ``t`` belongs to the
+        past. ``t`` may be any time from ``t_start`` to before ``t_end``, also one that `advance` has
+        stopped at inside a step; what was recorded after it is dropped. A run that has ended goes on,
+        unless `finish` was called or a function of the system has raised. Raises ValueError if ``t``
+        lies outside of the run, or `integrate` would refuse such a start; then nothing has changed.
+        """
+        options = {} if mode is None else {"mode": mode}
+        set_mode(options, *self._of)
+        self._restart(number_from(t, "t"), state_from(x, "x"), options.get("mode"))
+
+    def extend(self, t_end):
+        """Moves the end of the run to ``t_end``, which must lie ahead of the last step.
+
+        A run that has reached its end goes on, unless `finish` was called. Raises ValueError if
+        ``t_end`` does not lie ahead; then nothing has changed.
+        """
+        self._extend(number_from(t_end, "t_end"))
 
     def __iter__(self):
         """The times and states of all events and sample times to come."""

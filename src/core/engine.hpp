@@ -66,7 +66,8 @@ protected:
     /// @param options  options that have been validated
     EventEngine(const RunSetup<X>& setup, const X& x0, const Options& options)
         : setup_(setup),
-          system_(*setup.system, setup.door),
+          span_(span_of(setup, options)),
+          system_(*setup.system, setup.door, &span_),
           finders_{setup.detector, setup.detecting, setup.locator, setup.locating},
           error_controlled_(setup.error_controlled),
           guarded_(system_->guarded),
@@ -83,6 +84,7 @@ protected:
           search_(x0, bank_.size(), finders_, resolution_),
           resets_(x0),
           left_rate_(x0),
+          left_start_(x0),
           cascade_{x0}
     {
         const Screening screening = setup.detector.screening;
@@ -92,6 +94,14 @@ protected:
     }
 
     // --- set-up ---
+
+    /// The times at which functions may be called; a host may go on for ever.
+    [[nodiscard]] static RunSpan<X> span_of(const RunSetup<X>& setup, const Options& options)
+    {
+        if (!setup.kernel->take) return {};
+        return {.from = std::min(options.t_start, options.t_end),
+                .to = std::max(options.t_start, options.t_end)};
+    }
 
     /// Number of modes; 0: not declared. A system without modes is always in mode 0.
     [[nodiscard]] std::size_t modes() const { return system_->moded ? system_.modes() : 1; }
@@ -152,6 +162,12 @@ protected:
     /// Applies a time event at the start of the step; `settle` deals with its consequences.
     void apply_time_event();
 
+    /// After a time event the flow is that of the double after it, where it jumps there.
+    void start_beyond_time_event()
+    {
+        if (timed_ && passed_ == step_.start().value) step_.start_beyond(options_.t_end);
+    }
+
     // --- finding ---
 
     /// Lets the detector examine the step as it does every step. False: it holds no event.
@@ -201,9 +217,37 @@ protected:
         bank_.pass_on();
     }
 
+    // --- ties ---
+
+    /// Whether the end of the step is a time that is known before: that of a time event, or the end
+    /// of the run.
+    [[nodiscard]] bool ends_on_time() const noexcept
+    {
+        return time_event_due_ || step_.is_pinned();
+    }
+    /// Whether guard i is so near to its surface at the end of the step that rounding may decide
+    /// whether it has crossed.
+    [[nodiscard]] bool may_tie(std::size_t i) const noexcept;
+    /// The rate of guard i, if it crosses its surface at the end of the step within rounding: its
+    /// parabola crosses within 4 units in the last place of the time, or within the rounding of its
+    /// value over its rate, and its rate is more than rounding. Else 0; a touch does not tie.
+    [[nodiscard]] double rate_of_tie(std::size_t i);
+    [[nodiscard]] bool has_ties();
+    /// Joins guards that tie with the end of the step to a set there: to the set that has been
+    /// `found`, if it lies there, or to a new one. False: there are none.
+    [[nodiscard]] bool add_ties(bool found);
+    /// Records the crossings of recorded guards that tie with a time event.
+    void note_ties();
+
     /// Finds the first set that cuts the step short, and the state after its resets. False:
     /// the step stands, and the other events in it are recorded.
-    [[nodiscard]] bool find(bool cleared);
+    /// @param before_resets  called before the resets of a set, which may change the flow
+    template <class Before>
+    [[nodiscard]] bool find(bool cleared, const Before& before_resets);
+    [[nodiscard]] bool find(bool cleared)
+    {
+        return find(cleared, [] {});
+    }
 
     void count_refined() noexcept
     {
@@ -471,6 +515,7 @@ protected:
     {
         assign(left_rate_, step_.rate0());
         left_known_ = true;
+        left_after_ = 0;
     }
     /// Whether guard i is so near to its surface at x⁻ and x⁺ that only rounding tells its side.
     [[nodiscard]] bool stays_within_rounding(std::size_t i);
@@ -526,6 +571,9 @@ protected:
     /// Records a guard without effect that a reset has carried across its surface.
     void record_jump(std::size_t i, Side before);
 
+    /// Writes the state at a crossing at time t, found up to offset s, into x.
+    void assign_state_of(const Note& note, double s, double t, X& x);
+
     /// Records the events up to offset s that change nothing.
     void record_notes(double s);
 
@@ -547,6 +595,7 @@ protected:
     static constexpr double low_part = 0.05;
 
     const RunSetup<X>& setup_;
+    RunSpan<X> span_;
     SystemAt<X> system_;
     Finders<X> finders_;
     bool error_controlled_;
@@ -570,6 +619,7 @@ protected:
     bool watching_ = false;    ///< rates are sampled too, since every step is checked
     double time_event_ = std::numeric_limits<double>::infinity();
     bool time_event_due_ = false;
+    double passed_ = std::numeric_limits<double>::quiet_NaN();  ///< the last time event
     bool ended_ = false;
     bool resting_ = false;
     bool stops_ = false;
@@ -584,6 +634,8 @@ protected:
     boost::container::small_vector<std::pair<std::size_t, double>, 8> left_alone_;
     bool changed_mode_ = false;  ///< by the resets of the current set
     X left_rate_;                ///< flow at x⁻, of the mode that is left
+    X left_start_;               ///< the same at the start of the step
+    double left_after_ = 0;      ///< [s] later; 0: it is not known
     bool left_known_ = false;
     bool leaves_phase_ = false;  ///< `search_` still holds x⁻, which resets have left
     bool located_ = false;       ///< the current set lies inside the step, not at its start

@@ -12,6 +12,7 @@ inline void EventEngine<X, single>::cut_short()
     const double t = on_time_ ? time_event_ : time_of_set();
     bank_.forget_bands();
     note_crossings_to_set();
+    if (on_time_) note_ties();
     mode_before_ = step_.mode();
     for (const std::size_t i : search_.fired()) find_band(i, t);
     ++run_.statistics.steps;
@@ -38,7 +39,8 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
     leaves_phase_ = true;
     step_.restart(at, resets_.after(), resets_.mode());
     for (const auto& [component, lost] : left_alone_) step_.set_remainder(component, lost);
-    if (on_time) step_.hold(t);
+    if (on_time) step_.hold(passed_ = t);
+    start_beyond_time_event();
     if (stops_) return end(Outcome::stopped_by_event, stopper_);
     pending_ = Pending::settle;
 }

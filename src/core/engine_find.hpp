@@ -21,7 +21,7 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
     }
     if (bank_.size() == 0) return false;
     sample_end();
-    if (any_suspicious()) return true;
+    if (any_suspicious() || has_ties()) return true;
     if (asked_ && !cleared) ++run_.statistics.false_alarms;
     pass_on_clear();
     return false;
@@ -95,26 +95,34 @@ inline bool EventEngine<X, single>::ask_network()
 }
 
 template <class X, bool single>
-inline bool EventEngine<X, single>::find(bool cleared)
+template <class Before>
+inline bool EventEngine<X, single>::find(bool cleared, const Before& before_resets)
 {
     search_.begin(step_.x0());
     if (bank_.waiting()) end_plateaus();
     bank_.begin_search(step_.h());
-    while (search_.find_set(step_, bank_, time_event_due_, calls())) {
-        if (predicts_ && (cleared || search_.late())) ++run_.statistics.missed_events;
+    for (bool may_tie = true;;) {
+        const bool found = search_.find_set(step_, bank_, time_event_due_, calls());
+        const bool tied = may_tie && add_ties(found);
+        if (!found && !tied) break;
+        may_tie = may_tie && !tied;
+        if (found && predicts_ && (cleared || search_.late())) ++run_.statistics.missed_events;
         if (search_.late()) ++run_.statistics.late_events;
         dismiss_members();
-        if (search_.fired().empty()) continue;
         on_time_ = time_event_due_ && search_.at() == step_.h();
-        if (!on_time_ && !search_.meet_conditions(step_, bank_, calls())) {
-            ++run_.statistics.unmet_conditions;
-        }
+        if (search_.fired().empty() && !(tied && on_time_)) continue;
+        const bool met = tied ? search_.meet_conditions_on_time(step_, bank_, calls())
+                              : on_time_ || search_.meet_conditions(step_, bank_, calls());
+        run_.statistics.unmet_conditions += !met;
         left_known_ = system_->moded;
         if (left_known_) {
             assign(left_rate_, search_.before());
             step_.flow(search_.at(), search_.before(), left_rate_);
+            assign(left_start_, step_.rate0());
+            left_after_ = search_.at();
         }
         place_set(step_.instant(search_.at(), search_.at_remainder()));
+        before_resets();
         transform(on_time_, true);
         if (on_time_ || !changes_nothing() ||
             (resets_any_ && (changed_elsewhere() || acts_beyond()))) {
@@ -220,6 +228,8 @@ template <class X, bool single>
 inline void EventEngine<X, single>::go_on_past_members()
 {
     for (const std::size_t i : search_.fired()) {
+        // A run that starts where this one ends will have it, since the state is left before it.
+        if (!time_event_due_ && search_.was_joined(step_, i)) continue;
         search_.note(i, bank_[i].side, records_states());
         search_.pass(step_, bank_, i, calls());
     }
@@ -232,6 +242,7 @@ inline bool EventEngine<X, single>::judges_suspicious()
     for (const std::size_t i : planner_->judged()) {
         if (bank_.leaves_plateau(i) || bank_.suspicious(i, step_.h())) return true;
     }
+    if (has_ties()) return true;
     run_.statistics.evidence.add(finders_.detector.evidence);
     for (const std::size_t i : planner_->judged()) bank_.leave_plateau(i);
     return false;

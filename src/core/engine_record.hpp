@@ -149,6 +149,22 @@ inline void EventEngine<X, single>::record_jump(std::size_t i, Side before)
 }
 
 template <class X, bool single>
+inline void EventEngine<X, single>::assign_state_of(const Note& note, double s, double t, X& x)
+{
+    if (note.where.root == s && s == search_.at()) {
+        x = search_.before();
+    } else if (options_.record_steps && note.state == Note{}.state) {
+        // As the solution has it there.
+        x = step_.x0();
+        const double from = step_.time(0);
+        const DenseView<X, false> view(step_.dense(), backward_ ? from - t : t - from);
+        for_each_component(x, [&](auto i) { x[i] = view[i]; });
+    } else {
+        x = search_.state_at(step_, note);
+    }
+}
+
+template <class X, bool single>
 inline void EventEngine<X, single>::record_notes(double s)
 {
     if (search_.notes().empty()) return;
@@ -175,7 +191,7 @@ inline void EventEngine<X, single>::record_notes(double s)
                        .slope = note.where.slope,
                        .error = note.where.error};
         if (records_states()) {
-            event.before = search_.state_at(step_, note);
+            assign_state_of(note, s, t, event.before);
             event.after = event.before;
         }
         record(std::move(event));

@@ -129,6 +129,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     }
     leaves_phase_ = false;
     step_.restart(ahead, 0, after, mode_after);
+    start_beyond_time_event();
     for (const std::size_t k : search_.fired()) {
         bank_[k].rated_over = stale;
     }

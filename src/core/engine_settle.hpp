@@ -256,10 +256,17 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
     if (sign_of(side) * moved > noise) return false;
     if (sign_of(side) * moved >= -noise) {  // a vanishing rate has the sign that it has later
         const double ahead = 1e-6 * h_next_;
-        X later = step_.x0();
         X rate = left_rate_;
-        move(later, left, ahead, left_rate_);
-        step_.flow_in(mode_before_, step_.time(ahead), later, rate);
+        if (changed_mode_) {
+            // The flow of a mode that has been left is not called any more.
+            const double part = left_after_ > 0 ? ahead / left_after_ : 0;
+            for_each_component(rate,
+                               [&](auto c) { rate[c] += part * (left_rate_[c] - left_start_[c]); });
+        } else {
+            X later = step_.x0();
+            move(later, left, ahead, left_rate_);
+            step_.flow_in(mode_before_, step_.inside(step_.time(ahead)), later, rate);
+        }
         if (sign_of(side) * guard.rate(t, step_.x0(), rate, h_next_) > noise) return false;
     }
     return record.fired || std::fabs(guard.value(t, left)) <= rounding_of(i, t, left);
@@ -354,7 +361,8 @@ inline double EventEngine<X, single>::rate_ahead(std::size_t i, double ahead, do
         move(later, later, ahead / 2, rate_later);
         step_.flow(ahead, later, rate_later);
     }
-    return bank_.view(i, step_.mode(), calls()).rate(step_.time(ahead), later, rate_later, scale);
+    return bank_.view(i, step_.mode(), calls())
+        .rate(step_.inside(step_.time(ahead)), later, rate_later, scale);
 }
 
 template <class X, bool single>
@@ -369,7 +377,9 @@ inline double EventEngine<X, single>::rounding_of(std::size_t i, double t, const
     constexpr double nudge = 8 * std::numeric_limits<double>::epsilon();
     const auto guard = bank_.view(i, step_.mode(), calls());
     const double g = guard.value(t, x);
-    double rounding = std::fabs(guard.value(t * (1 + nudge), x) - g);
+    double beside = t * (1 + nudge);
+    if (step_.inside(beside) != beside) beside = step_.inside(t * (1 - nudge));
+    double rounding = std::fabs(guard.value(beside, x) - g);
     X near = x;
     for_each_component(near, [&](auto c) {
         const double kept = near[c];

@@ -48,9 +48,9 @@ private:
 
 /// An event that changes nothing, found inside a step.
 struct Note {
-    std::size_t guard;
-    EventKind kind;
-    Side side;  ///< the side that the guard left
+    std::size_t guard = 0;
+    EventKind kind = EventKind::crossing;
+    Side side = Side::plateau;  ///< the side that the guard left
     Location where;
     std::size_t state = std::numeric_limits<std::size_t>::max();  ///< index of its state, if kept
 };

@@ -98,6 +98,21 @@ public:
         at_ = at_remainder_ = 0;
         rated_at_set_ = values_known_ = false;
     }
+    /// Places the current set at the end of the step.
+    void stay_at_end(const CurrentStep& step)
+    {
+        at_ = step.h();
+        at_remainder_ = 0;
+        rated_at_set_ = straight_in_space_ = has_lost_ = values_known_ = false;
+        assign(before_, step.x1());
+    }
+    /// Adds guard i to the set at the end of the step, where it leaves `side` within rounding.
+    void join_at_end(const CurrentStep& step, std::size_t i, Side side, double rate);
+    [[nodiscard]] bool was_joined(const CurrentStep& step, std::size_t i) noexcept
+    {
+        return where(i).lo == step.h();
+    }
+
     [[nodiscard]] const Location& where(std::size_t guard) noexcept
     {
         for (Hit& hit : hits_) {
@@ -151,6 +166,9 @@ public:
     /// to the root predicted by the slopes of those that have not, at most as far as the bracket
     /// within which they were located. False: nowhere, and nothing is moved.
     bool meet_conditions(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
+
+    /// The same for a set whose time is given: only the state is moved.
+    bool meet_conditions_on_time(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
 
     /// Adds the crossings and touches of a recorded guard, up to the sample `end`.
     void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
@@ -213,6 +231,16 @@ public:
         if (has_lost_) return lost_[i];
         if (!straight_in_space_) return at_remainder_ == 0 ? step.lost_at(at_, c) : 0;
         return lost_from(step, straight_from_, space_.x, space_.dxdt, c);
+    }
+
+    /// Remembers the same for all components, since repeats of the step forget it.
+    void keep_lost(const CurrentStep& step)
+    {
+        if (before_.size() > 64) return;
+        for (std::size_t c = 0; c < static_cast<std::size_t>(before_.size()); ++c) {
+            lost_[static_cast<decltype(before_.size())>(c)] = lost_at_set(step, c);
+        }
+        has_lost_ = true;
     }
 
     /// Value |g| at the set, where `meet_conditions` has evaluated the guard; else NaN.

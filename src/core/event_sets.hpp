@@ -108,12 +108,23 @@ inline void EventSearch<X, single>::settle_place(const CurrentStep& step, bool t
             place(step, at_, before_);
         }
     }
-    if (time_event_due && at_ + resolution_.window(step.time(at_)) >= step.h()) {
-        at_ = step.h();
-        at_remainder_ = 0;
-        rated_at_set_ = straight_in_space_ = has_lost_ = false;
-        assign(before_, step.x1());
-    }
+    if (time_event_due && at_ + resolution_.window(step.time(at_)) >= step.h()) stay_at_end(step);
+}
+
+template <class X, bool single>
+void EventSearch<X, single>::join_at_end(const CurrentStep& step, std::size_t i, Side side,
+                                         double rate)
+{
+    Hit* const known =
+        std::find_if(hits_.begin(), hits_.end(), [i](const Hit& hit) { return hit.guard == i; });
+    Hit& hit = known != hits_.end() ? *known : hits_.add();
+    hit = Hit{};
+    hit.guard = i;
+    hit.side = side;
+    hit.located = true;
+    const double h = step.h();
+    hit.where = {.lo = h, .hi = h, .root = h, .slope = rate};
+    fired_.push_back(i);
 }
 
 template <class X, bool single>
@@ -197,6 +208,24 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
             if (rate_[i] != 0) x[i] = std::nextafter(x[i], std::copysign(HUGE_VAL, rate_[i]));
         });
         if (holds(0)) return true;
+    }
+    return false;
+}
+
+template <class X, bool single>
+bool EventSearch<X, single>::meet_conditions_on_time(const CurrentStep& step, Bank& bank,
+                                                     std::uint64_t& calls)
+{
+    const TwoSum at{at_, 0};
+    double wait = lacks(step, bank, before_, at, calls);
+    if (wait == 0) return true;
+    keep_rate(step);
+    X& x = space_.root;
+    for (int k = 0; k <= 8 && std::isfinite(wait); ++k, wait *= 2) {
+        move(x, before_, wait, rate_);
+        if (!all_finite(x) || lacks(step, bank, x, at, calls) != 0) continue;
+        assign(before_, x);
+        return true;
     }
     return false;
 }

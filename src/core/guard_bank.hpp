@@ -400,6 +400,7 @@ public:
         return rate0_[i];
     }
 
+    [[nodiscard]] double g1(std::size_t i) const noexcept { return g1_[i]; }
     [[nodiscard]] double g0(std::size_t i) const noexcept { return g0_[i]; }
     [[nodiscard]] double rate0(std::size_t i) const noexcept { return rate0_[i]; }
     void set_rate0(std::size_t i, double rate) noexcept { rate0_[i] = rate; }

@@ -11,9 +11,9 @@ namespace ricochet::detail {
 
 /// A first step [s] at which an Euler step and the change of the flow over it stay well
 /// inside the tolerance (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations
-/// I, section II.4). `step` stands at the start.
+/// I, section II.4). `step` stands at the start, and the run ends after `span` [s].
 template <class CurrentStep>
-[[nodiscard]] double initial_step(const CurrentStep& step, const Options& options)
+[[nodiscard]] double initial_step(const CurrentStep& step, const Options& options, double span)
 {
     const int order = step.error_order() + 1;
     const auto& x = step.x0();
@@ -32,8 +32,9 @@ template <class CurrentStep>
         speed = std::max(speed, std::fabs(dxdt[i]) / scale(i));
     });
     // The state has no time scale here, nor is the distance to the end one.
-    const double least = 1e-6 * std::min(1.0, std::fabs(options.t_end - options.t_start));
-    const double euler = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : least;
+    const double least = 1e-6 * std::min(1.0, span);
+    const double guess = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : least;
+    const double euler = std::min(guess, span);  // the flow may not exist beyond the end
     auto moved = x;
     auto rate = dxdt;
     move(moved, x, euler, dxdt);

@@ -37,7 +37,7 @@ class LargeKernel {
     [[gnu::always_inline]] static void flow(void* door, State& step, double s, X& rate)
     {
         ++step.flow_calls;
-        step.flow_fits &= step.flow(door, step.mode, step.time(s), step.at, rate);
+        step.flow_fits &= step.flow(door, step.mode, step.flow_time(s), step.at, rate);
         if (step.backward) {
             for (double& each : rate) each = -each;
         }

@@ -52,7 +52,7 @@ public:
         if (error_controlled_) {
             if (step_.error_order() == 0) throw_no_error_estimate();
             step_.measure_with(options_.component_atol, options_.atol);
-            if (options_.step == 0) h_next_ = initial_step(step_, options_);
+            if (options_.step == 0) h_next_ = initial_step(step_, options_, h_next_);
             h_next_ = std::min(h_next_, options_.h_max);
         }
         first_step_ = h_next_;
@@ -78,15 +78,30 @@ public:
 
     [[nodiscard]] double t() const noexcept override  ///< [s]
     {
-        return showing_sample_ ? run_.trajectory.t[shown_samples_ - 1] : step_.start().value;
+        switch (showing_) {
+            case Showing::sample: return run_.trajectory.t[shown_samples_ - 1];
+            case Showing::event: return run_.events[shown_records_ - 1].t;
+            case Showing::step: break;
+        }
+        return step_.start().value;
     }
     [[nodiscard]] const X& x() const noexcept override
     {
-        return showing_sample_ ? run_.trajectory.x[shown_samples_ - 1] : step_.x0();
+        switch (showing_) {
+            case Showing::sample: return run_.trajectory.x[shown_samples_ - 1];
+            case Showing::event: return run_.events[shown_records_ - 1].after;
+            case Showing::step: break;
+        }
+        return step_.x0();
     }
     [[nodiscard]] Mode mode() const noexcept override
     {
-        return showing_sample_ ? sample_mode_ : step_.mode();
+        switch (showing_) {
+            case Showing::sample: return sample_mode_;
+            case Showing::event: return run_.events[shown_records_ - 1].mode_after;
+            case Showing::step: break;
+        }
+        return step_.mode();
     }
     [[nodiscard]] bool ended() const noexcept override { return ended_; }
     /// Result so far; `finish` brings its time and state up to date.
@@ -107,9 +122,10 @@ public:
         return !ended_;
     }
 
-    /// Advances to the next sample time, or to the end of the next step that holds events;
-    /// `t`, `x` and `mode` are those there, after the events. False: the run has ended, and
-    /// everything that has happened in it was shown.
+    /// Advances to the next sample time or event, which is shown once, with all others at its
+    /// instant; `t`, `x` and `mode` are those there, after the events. Events whose states are not
+    /// recorded are shown at the end of their step. False: the run has ended, and everything that
+    /// has happened in it was shown.
     bool advance() override;
 
     /// Takes one step. If it looks ahead, the step may end in the middle of an interval of
@@ -122,8 +138,9 @@ public:
     void show_all() noexcept override
     {
         shown_samples_ = run_.trajectory.t.size();
+        shown_records_ = run_.events.size();
         shown_events_ = run_.statistics.events;
-        showing_sample_ = false;
+        showing_ = Showing::step;
     }
 
     // --- quiet steps that are taken elsewhere ---
@@ -165,6 +182,9 @@ public:
     /// @throws std::invalid_argument naming what does not agree if the snapshot is of another
     /// run, or does not hold a valid state; then nothing has changed.
     void restore(const Snapshot& snapshot) override;
+
+    void restart(double t, const X& x, Mode mode) override;
+    void extend(double t_end) override;
 
 protected:
     /// Keeps the start of every step from here on, so that the run can continue after exceptions.
@@ -234,6 +254,26 @@ private:
     }
     [[gnu::noinline]] void advance_resumably(const Advance& how);
     [[gnu::always_inline]] void advance_from_here(const Advance& how);
+
+    /// What `advance` has stopped at.
+    enum class Showing : std::uint8_t { step, sample, event };
+
+    /// Shows the next sample or recorded event that lies in the steps taken, if there is one.
+    [[nodiscard]] bool show_next();
+    /// Whether events can be shown at their own times.
+    [[nodiscard]] bool shows_events() const noexcept
+    {
+        return !setup_.add_event && this->records_states();
+    }
+
+    // --- interventions ---
+
+    void refuse_bad_restart(double t, const X& x, Mode mode) const;
+    void start_at(double t, const X& x, Mode mode);
+    /// Drops what was recorded after time t.
+    void drop_from(double t);
+    /// Places the step where `visit_state` has read the place.
+    void go_on_from_place();
 
     // --- resumption after an exception ---
 
@@ -414,8 +454,16 @@ private:
     /// @param proposed  length of the step if nothing had cut it short
     [[nodiscard]] bool take_controlled_step(double h, double proposed)
     {
-        const double error = step_.attempt(h, options_.rtol, options_.atol);
+        double error = step_.attempt(h, options_.rtol, options_.atol);
+        if (jumps_at_end()) error = step_.attempt(h, options_.rtol, options_.atol);
         return retry(h, proposed, rule_.largest, error);
+    }
+
+    /// Whether the attempt that ends at a time event has to be repeated, since the flow jumps
+    /// there.
+    [[nodiscard]] bool jumps_at_end()
+    {
+        return time_event_due_ && step_.sees_jump_at_end(time_event_);
     }
 
     /// Repeats an attempt with the given `error`, shorter, until one is accepted; the next step is
@@ -467,6 +515,9 @@ private:
         record_restart();
     }
 
+    /// Completes what the step has to show before the resets of a set, which may change the flow.
+    void show_before_resets();
+
     /// Searches a step that may hold events, and handles them.
     [[gnu::noinline]] bool search(bool cleared);
 
@@ -499,12 +550,27 @@ private:
             run_.solution.add(step_.time(0), backward_, step_.mode(), step_.dense(), s);
         }
     }
+    /// The part of the step before a set at time t, at whose end is x⁻.
+    void record_step_to_set(double s, double t)
+    {
+        if (!options_.record_steps || !(s > 0)) return;
+        record_step(s);
+        run_.solution.end_at(t, search_.before());
+    }
 
     /// Adds the present state to the solution, kept for a length of time [s], which may be zero.
     void record_place(double length);
 
     /// Adds the state after resets to the solution, of which no step that starts there is part yet.
     void record_restart();
+
+    /// The end of the times that are before an event at t: a sample that only rounding parts from
+    /// it is taken after it.
+    [[nodiscard]] double before_rounding(double t) const noexcept
+    {
+        const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+        return backward_ ? t + ulps : t - ulps;
+    }
 
     [[nodiscard]] bool lies_before(double t, double end) const noexcept
     {
@@ -520,6 +586,8 @@ private:
 
     /// Samples of a state that stays constant, before the time `until`.
     void emit_held_samples(double until);
+    /// Samples at the time at which the run has ended.
+    void emit_last_samples();
 
     void add_sample(X&& x);
 
@@ -531,8 +599,8 @@ private:
     /// What ended the run, if it has ended.
     template <class Visitor>
     void visit_cause(Visitor&& visit);
-    /// Lets a run continue that ended because it was cancelled, or at an end before that of the
-    /// options.
+    /// Lets a run continue that ended because it was cancelled, at an end before that of the
+    /// options, at a limit on its steps that is not reached here, or stalled.
     void reopen() noexcept;
 
     /// The next sample is the first that is neither in the past nor already written.
@@ -553,8 +621,10 @@ private:
     int calm_steps_ = 0;  ///< number of consecutive steps without an event
     std::size_t next_sample_ = 0;
     std::size_t shown_samples_ = 0;  ///< number of samples shown by `advance`
+    std::size_t shown_records_ = 0;  ///< and of events among those recorded
     std::uint64_t shown_events_ = 0;
-    bool showing_sample_ = false;
+    Showing showing_ = Showing::step;
+    bool over_ = false;  ///< the result has been handed out
     Mode sample_mode_ = 0;
     StepStart<X> place_;
     std::unique_ptr<Mark> mark_;  ///< null: the run does not continue after an exception

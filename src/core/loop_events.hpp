@@ -24,14 +24,24 @@ bool Loop<X, single>::search(bool cleared)
         }
     }
     if (error_controlled_ && step_.may_be_rough() && !smooth_step()) return true;
-    if (!this->find(cleared)) return ended_;
+    if (!this->find(cleared, [&] { show_before_resets(); })) return ended_;
     const double t = on_time_ ? time_event_ : this->time_of_set();
-    emit_samples(search_.at(), t);
-    record_step(search_.at());
+    record_step_to_set(search_.at(), t);
     limit_next_step(t);
     this->cut_short();
     settle_and_record();
     return true;
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::show_before_resets()
+{
+    if (options_.record_steps) static_cast<void>(step_.dense());
+    const double t = before_rounding(on_time_ ? time_event_ : this->time_of_set());
+    if (next_sample_ == options_.sample_times.size()) return;
+    if (!lies_before(options_.sample_times[next_sample_], t)) return;
+    search_.keep_lost(step_);
+    emit_more_samples(search_.at(), t);
 }
 
 template <class X, bool single>

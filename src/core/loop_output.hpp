@@ -36,6 +36,13 @@ inline void Loop<X, single>::emit_held_samples(double until)
 }
 
 template <class X, bool single>
+inline void Loop<X, single>::emit_last_samples()
+{
+    const double t = step_.start().value;
+    emit_held_samples(std::nextafter(t, backward_ ? -infinity : infinity));
+}
+
+template <class X, bool single>
 inline void Loop<X, single>::record_place(double length)
 {
     X zero = step_.x0();

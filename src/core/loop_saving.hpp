@@ -33,10 +33,16 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
         visit_state(SnapshotReader(old));
         throw;
     }
+    go_on_from_place();
+    show_all();
+}
+
+template <class X, bool single>
+inline void Loop<X, single>::go_on_from_place()
+{
     step_.restart(place_);
     next_review_ = 0;
     watching_ = replans_ = false;
-    show_all();
     if (guarded_) search_.begin(step_.x0());
     if (defers_) planner_->restore(bank_);
 }
@@ -55,6 +61,7 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
     visit(flight_start_);
     visit(longest_step_);
     visit(time_event_);
+    if (timed_) visit(place_.is_beyond);
     visit(resting_);
     visit(ended_);
     visit(run_.outcome);
@@ -71,9 +78,11 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
 template <class X, bool single>
 inline void Loop<X, single>::reopen() noexcept
 {
+    const auto ended_by = [this](Outcome outcome) { return run_.outcome == outcome; };
     const bool short_of_end = lies_before(place_.t.value, options_.t_end);
-    if (run_.outcome == Outcome::cancelled ||
-        (run_.outcome == Outcome::reached_end && short_of_end)) {
+    const bool has_steps = run_.statistics.steps < options_.max_steps;
+    if (ended_by(Outcome::cancelled) || (ended_by(Outcome::reached_end) && short_of_end) ||
+        (ended_by(Outcome::step_limit) && has_steps) || ended_by(Outcome::stalled)) {
         ended_ = false;
         run_.outcome = Outcome::reached_end;
     }

@@ -52,9 +52,11 @@ inline void Loop<X, single>::refuse_bad_place() const
                                       : components >= (may_shrink ? 1 : components_)) &&
                 place_.remainder.size() == place_.x.size() && place_.rate.size() == place_.x.size(),
             "the number of components");
+    if (lies_before(options_.t_end, place_.t.value)) {
+        throw_snapshot_later(place_.t.value, options_.t_end);
+    }
     const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(place_.t.value);
     require(std::isfinite(place_.t.value) && std::fabs(place_.t.remainder) <= ulp &&
-                !lies_before(options_.t_end, place_.t.value) &&
                 !lies_before(place_.t.value, options_.t_start),
             "the time");
     require(

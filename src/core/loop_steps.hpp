@@ -9,19 +9,39 @@ template <class X, bool single>
 inline bool Loop<X, single>::advance()
 {
     for (;;) {
-        showing_sample_ = shown_samples_ < run_.trajectory.t.size();
-        if (showing_sample_) {
-            ++shown_samples_;
-            return true;
+        if (show_next()) return true;
+        if (ended_) {
+            emit_last_samples();
+            return show_next();
         }
-        if (std::exchange(shown_events_, run_.statistics.events) != run_.statistics.events) {
-            return true;
-        }
-        if (ended_) return false;
         do {
             advance_one({.to_next_sample = true});
         } while (!ended_ && is_tentative());
     }
+}
+
+template <class X, bool single>
+bool Loop<X, single>::show_next()
+{
+    const auto& samples = run_.trajectory.t;
+    const auto& events = run_.events;
+    const bool has_sample = shown_samples_ < samples.size();
+    const bool has_event = shows_events() && shown_records_ < events.size();
+    showing_ = Showing::step;
+    if (has_sample &&
+        !(has_event && !lies_before(samples[shown_samples_], events[shown_records_].t))) {
+        ++shown_samples_;
+        showing_ = Showing::sample;
+        return true;
+    }
+    if (has_event) {
+        const double t = events[shown_records_].t;
+        while (shown_records_ < events.size() && events[shown_records_].t == t) ++shown_records_;
+        if (t != step_.start().value) showing_ = Showing::event;
+        return true;
+    }
+    const std::uint64_t count = run_.statistics.events;
+    return std::exchange(shown_events_, count) != count && !shows_events();
 }
 
 template <class X, bool single>
@@ -41,7 +61,8 @@ template <class X, bool single>
 inline Run<X> Loop<X, single>::finish()
 {
     if (!ended_) run_.outcome = Outcome::cancelled;
-    ended_ = true;
+    ended_ = over_ = true;
+    showing_ = Showing::step;
     bring_up_to_date();
     return std::move(run_);
 }
@@ -54,7 +75,7 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
     run_.mode = step_.mode();
     this->collect_counts();
     if (ended_) {
-        emit_held_samples(std::nextafter(run_.t, backward_ ? -infinity : infinity));
+        emit_last_samples();
         record_restart();
     }
     return run_;
@@ -118,7 +139,8 @@ inline void Loop<X, single>::reach_end()
 template <class X, bool single>
 inline void Loop<X, single>::accept()
 {
-    emit_samples(step_.h(), step_.time(step_.h()));
+    const double end = step_.time(step_.h());
+    emit_samples(step_.h(), time_event_due_ ? before_rounding(end) : end);
     record_step(step_.h());
     if (is_last_) {
         step_.accept_at(options_.t_end);
@@ -167,7 +189,10 @@ template <class X, bool single>
 inline bool Loop<X, single>::take_fixed_step(double h, bool failed)
 {
     for (;;) {
-        if (!std::exchange(failed, false) && step_.attempt(h)) return true;
+        if (!std::exchange(failed, false)) {
+            const bool taken = step_.attempt(h);
+            if (jumps_at_end() ? step_.attempt(h) : taken) return true;
+        }
         const double ahead = time_to_surface().ahead;
         if (!(ahead <= h)) break;
         if (ahead < smallest_step()) {
@@ -278,7 +303,7 @@ inline void Loop<X, single>::hold(double remaining)
         time_event_due_ = step_.until(time_event_) <= remaining;
         if (time_event_due_) until = time_event_;
     }
-    emit_held_samples(until);
+    emit_held_samples(time_event_due_ ? before_rounding(until) : until);
     if (options_.record_steps) record_place(step_.until(until));
     step_.hold(until);
     if (time_event_due_) {

@@ -24,8 +24,14 @@ inline std::size_t Planner<X, single>::close_one(std::size_t i, const Step<X>& s
         return none;
     }
     end = check_at(i, steps_.size(), step, bank, counts);
-    const std::size_t failed =
-        narrow({i, step, bank, counts}, from, known.first, steps_.size(), end);
+    // A guard that ties with the end of the step has not crossed before it.
+    const bool may_tie =
+        step.is_pinned() && std::fabs(end.value) <= 0x1p-20 * std::fabs(from.value);
+    std::size_t failed = narrow({i, step, bank, counts}, from, known.first, steps_.size(), end);
+    if (may_tie && failed == none) {
+        failed = steps_.size() - 1;
+        failing_value_ = end.value;
+    }
     const bool moved = from.time != known.time || failed == none;
     const double rate = known.rate;
     if (failed != none) remember(known, place(failed + 1, step).time, failing_value_);

@@ -86,7 +86,7 @@ protected:
             return;
         }
         sample_values(at.motion.mode, at.motion.t, at.motion.x, calls, g);
-        sample_rates(at, calls, rates);
+        sample_rates(at, calls, rates, &g);
     }
 
     void sample_values(Mode mode, double t, const X& x, std::uint64_t& calls, Doubles& g)
@@ -96,7 +96,9 @@ protected:
         calls += size();
     }
 
-    void sample_rates(const SamplePoint<X>& at, std::uint64_t& calls, Doubles& rates)
+    /// @param g  the values there, or null
+    void sample_rates(const SamplePoint<X>& at, std::uint64_t& calls, Doubles& rates,
+                      const Doubles* g = nullptr)
     {
         if (!rules_.uses_rates || size() == 0) return;
         if (system_->rates) {
@@ -104,20 +106,33 @@ protected:
         } else if (system_->each_rate && !selective_ && !backward_) {
             system_->each_rate(system_.door(), at.motion, all(rates));
         } else if (!system_->each_rate && !system_->guard_alone) {
-            difference(at, rates);
+            const bool is_cut = system_.is_near_end(at.motion.t, 1e-5 * at.scale);
+            if (is_cut) {
+                if (g) {
+                    for (std::size_t i = 0; i < size(); ++i) rates[i] = (*g)[i];
+                } else {
+                    sample_values(at.motion.mode, at.motion.t, at.motion.x, calls, rates);
+                }
+                difference_inside(at, rates);
+            } else {
+                difference(at, rates);
+            }
             calls += 2 * size();
         } else {
             for (std::size_t i = 0; i < size(); ++i) {
-                rates[i] = is_rateless(i) ? 0 : rate_alone(i, at, calls);
+                const double known = g ? (*g)[i] : std::numeric_limits<double>::quiet_NaN();
+                rates[i] = is_rateless(i) ? 0 : rate_alone(i, at, calls, known);
             }
             return;
         }
         if (!all_finite(rates)) replace_lost(at, calls, rates);
     }
 
-    [[nodiscard]] double rate_alone(std::size_t i, const SamplePoint<X>& at, std::uint64_t& calls)
+    [[nodiscard]] double rate_alone(std::size_t i, const SamplePoint<X>& at, std::uint64_t& calls,
+                                    double g = std::numeric_limits<double>::quiet_NaN())
     {
-        return view(i, at.motion.mode, calls).rate(at.motion.t, at.motion.x, at.motion.s, at.scale);
+        return view(i, at.motion.mode, calls)
+            .rate(at.motion.t, at.motion.x, at.motion.s, at.scale, g);
     }
 
     /// Rates of all guards from the system in one call.
@@ -142,6 +157,25 @@ protected:
         system_->guards(system_.door(), at.motion.mode, at.motion.t - ahead, there_, all(behind_));
         for (std::size_t i = 0; i < size(); ++i) {
             rates[i] = records_[i].info.boolean ? 0 : (rates[i] - behind_[i]) / (2 * delta);
+        }
+    }
+
+    /// The same at an end of the run, as `CoreGuard::rate_inside`, from the values there in
+    /// `rates`.
+    void difference_inside(const SamplePoint<X>& at, Doubles& rates)
+    {
+        const double delta = system_.span()->inward(at.motion.t, 1e-5 * at.scale);
+        if (there_.size() != at.motion.x.size()) there_ = at.motion.x;
+        const auto guards = [&](double later, Doubles& g) {
+            detail::move(there_, at.motion.x, backward_ ? -later : later, at.motion.s);
+            system_->guards(system_.door(), at.motion.mode, at.motion.t + later, there_, all(g));
+        };
+        guards(delta, behind_);
+        for (std::size_t i = 0; i < size(); ++i) rates[i] = 4 * behind_[i] - 3 * rates[i];
+        guards(2 * delta, behind_);
+        for (std::size_t i = 0; i < size(); ++i) {
+            const double slope = (rates[i] - behind_[i]) / (2 * delta);
+            rates[i] = records_[i].info.boolean ? 0 : backward_ ? -slope : slope;
         }
     }
 

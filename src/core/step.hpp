@@ -48,6 +48,7 @@ public:
         state_.start = {options.t_start, 0};
         state_.mode = options.mode;
         state_.backward = options.t_end < options.t_start;
+        forget_jumps();
         arrive();
     }
 
@@ -80,6 +81,23 @@ public:
         place_tolerances();
     }
 
+    /// Offsets [s] from the start up to which and from which on functions may be called.
+    [[nodiscard]] double latest() const noexcept
+    {
+        return state_.backward ? state_.start.value - system_.earliest()
+                               : system_.latest() - state_.start.value;
+    }
+    [[nodiscard]] double earliest() const noexcept
+    {
+        return state_.backward ? state_.start.value - system_.latest()
+                               : system_.earliest() - state_.start.value;
+    }
+    /// The time t, or the end of the run that lies before it.
+    [[nodiscard]] double inside(double t) const noexcept
+    {
+        return std::min(std::max(t, system_.earliest()), system_.latest());
+    }
+
     /// Seconds from the start to time t, positive if it lies ahead.
     [[nodiscard]] double until(double t) const noexcept
     {
@@ -93,6 +111,8 @@ public:
         pinned_h_ = h;
         pinned_t_ = t;
     }
+    /// Whether the current step ends at a time that was given.
+    [[nodiscard]] bool is_pinned() const noexcept { return state_.h == pinned_h_; }
     [[nodiscard]] double h() const noexcept { return state_.h; }
     [[nodiscard]] const X& x0() const noexcept { return state_.x0; }
     [[nodiscard]] const X& x1() const noexcept { return state_.x1; }
@@ -215,10 +235,19 @@ public:
         add_tangent(s, x);
     }
 
-    /// What rounding has taken from component i of the state that the last `restep` has placed at
-    /// offset s; zero if it was at another.
+    /// What rounding has taken from component i of the state at the end of the step, or of the one
+    /// that the last `restep` has placed at offset s; zero if it was at another.
     [[nodiscard]] double lost_at(double s, std::size_t i) const noexcept
     {
+        if (s == state_.h && !state_.host) {
+            if constexpr (is_small<X>) {
+                return two_sum(state_.x0[i],
+                               s * state_.rate0[i] + (state_.w[i] + state_.remainder[i]))
+                    .remainder;
+            } else {
+                return state_.large.remainder1[i];
+            }
+        }
         if (s != departed_ || departed_from_ != state_.start.value || state_.host) return 0;
         return two_sum(state_.x0[i], s * state_.rate0[i] + (departure_[i] + state_.remainder[i]))
             .remainder;
@@ -279,7 +308,7 @@ public:
     void flow(double s, const X& x, X& dxdt) const
     {
         if (state_.host) return rate_on_host(s, dxdt);
-        flow_in(state_.mode, time(s), x, dxdt);
+        flow_in(state_.mode, state_.flow_at(time(s)), x, dxdt);
     }
 
     /// x' = f(t, x) in another mode, where the flow is the system's and not a host's.
@@ -304,6 +333,37 @@ public:
             alike = alike && std::fabs(rate[i] - state_.rate1[i]) <= part * size;
         });
         return alike;
+    }
+
+    // --- time events, at which the flow may jump ---
+
+    /// Has the flow of the step that was taken seen a jump at its end, the time event at t? From
+    /// here on no stage sees the flow there, but that of the double before. False for hosts.
+    bool sees_jump_at_end(double t)
+    {
+        const double before = beside(t, true);
+        if (!kernel_->take || kernel_->reach || flow_end() == before) return false;
+        if (!all_finite(state_.x1) || !(until(before) > 0)) return false;
+        if (kernel_->series) {  // its rate at the end is that of the interpolant
+            flow_in(state_.mode, state_.time(state_.h), state_.x1, unused_rate_);
+        } else {
+            assign(unused_rate_, state_.rate1);
+        }
+        if (!jumps_beside(before, true, state_.x1)) return false;
+        flow_end() = before;
+        return true;
+    }
+
+    /// The start of the step is a time event, which lies before `end`: where the flow jumps there
+    /// the step sees that of the double after it.
+    void start_beyond(double end)
+    {
+        const double after = beside(state_.start.value, false);
+        if (!kernel_->take || kernel_->reach || !(until(end) > until(after))) return;
+        assign(unused_rate_, state_.rate0);
+        if (!jumps_beside(after, false, state_.x0)) return;
+        flow_start() = after;
+        assign(state_.rate0, state_.at);
     }
 
     /// The rate of the step's polynomial at offset s.
@@ -468,6 +528,15 @@ public:
         begin(at.x, at.mode);
         assign(state_.remainder, at.remainder);
         assign(state_.rate0, at.rate);
+        if (at.is_beyond) flow_start() = beside(at.t.value, false);
+    }
+
+    /// Takes note that the span of the run has changed.
+    void renew_span() noexcept
+    {
+        const bool beyond = is_beyond();
+        forget_jumps();
+        if (beyond) flow_start() = beside(state_.start.value, false);
     }
 
     /// Advances the time alone, to t.
@@ -478,7 +547,13 @@ public:
 
     [[nodiscard]] StepStart<X> place() const
     {
-        return {state_.start, state_.mode, state_.x0, state_.remainder, state_.rate0};
+        return {state_.start, state_.mode, state_.x0, state_.remainder, state_.rate0, is_beyond()};
+    }
+    /// Whether the flow at the start is that of the double after it.
+    [[nodiscard]] bool is_beyond() const noexcept
+    {
+        const double first = state_.backward ? state_.flow_to : state_.flow_from;
+        return first != (state_.backward ? system_.latest() : system_.earliest());
     }
 
     /// Keeps the flow at the start of the step that is about to be taken: a method with a series
@@ -510,6 +585,7 @@ public:
         assign(at.x, state_.x0);
         assign(at.remainder, state_.remainder);
         assign(at.rate, state_.rate0);
+        at.is_beyond = is_beyond();
     }
 
     /// Whether every call of the flow has given its rate as many components as the state.
@@ -548,6 +624,55 @@ private:
         assign(departure_, w);
     }
 
+    /// The double beside t, `earlier` in the run or later.
+    [[nodiscard]] double beside(double t, bool earlier) const noexcept
+    {
+        const double end = std::numeric_limits<double>::infinity();
+        return std::nextafter(t, earlier == state_.backward ? end : -end);
+    }
+    [[nodiscard]] double& flow_start() noexcept
+    {
+        return state_.backward ? state_.flow_to : state_.flow_from;
+    }
+    [[nodiscard]] double& flow_end() noexcept
+    {
+        return state_.backward ? state_.flow_from : state_.flow_to;
+    }
+    void forget_jumps() noexcept
+    {
+        state_.flow_from = system_.earliest();
+        state_.flow_to = system_.latest();
+    }
+
+    /// Whether the flow at x differs between a time event, where it is `unused_rate_`, and the
+    /// double t beside it by more than rounding, and by more than it does from there to the next:
+    /// a flow that changes fast with time does not jump. Leaves the flow there in `at`.
+    [[nodiscard]] bool jumps_beside(double t, bool earlier, const X& x)
+    {
+        X& there = state_.at;
+        assign(there, x);  // which has its dimension
+        flow_in(state_.mode, t, x, there);
+        const auto rounding = [&](auto i) {
+            return 16 * std::numeric_limits<double>::epsilon() *
+                   (std::fabs(unused_rate_[i]) + std::fabs(there[i]) + std::fabs(state_.rate0[i]));
+        };
+        const auto differ = [&](auto i) {
+            return !(std::fabs(there[i] - unused_rate_[i]) <= rounding(i));
+        };
+        bool alike = true;
+        for_components([&](auto i) { alike = alike && !differ(i); });
+        if (alike) return false;
+        X& further = end_slope_;
+        assign(further, x);
+        flow_in(state_.mode, beside(t, earlier), x, further);
+        bool jumps = false;
+        for_components([&](auto i) {
+            const double slope = std::fabs(further[i] - there[i]);
+            jumps = jumps || (differ(i) && !(std::fabs(there[i] - unused_rate_[i]) <= 8 * slope));
+        });
+        return jumps;
+    }
+
     /// The flow at the start; a host supplies it by `set_rate`.
     void arrive()
     {
@@ -572,6 +697,7 @@ private:
         assign(state_.remainder, state_.zero);
         state_.has_middle = false;
         state_.asked_alone = 0;
+        forget_jumps();
         departed_ = std::numeric_limits<double>::quiet_NaN();
     }
 

@@ -473,10 +473,11 @@ Finding Bernstein::examine(GuardPath& path, Watch& watch) const
     // Rounding [s] of a time in the step.
     const double clock =
         1.2e-16 * std::max(std::fabs(path.time(0)), std::fabs(path.time(path.h())));
-    const detail::BernsteinTask task{.crossing = path.crossing(),
-                                     .degree = degree <= detail::most_bernstein_degree ? degree : 0,
-                                     .clock = clock,
-                                     .goes_on = path.is_polynomial()};
+    const detail::BernsteinTask task{
+        .crossing = path.crossing(),
+        .degree = degree <= detail::most_bernstein_degree ? degree : 0,
+        .clock = clock,
+        .goes_on = path.is_polynomial() && path.latest() >= 1.25 * path.h()};
     const int n = task.degree > 0 ? task.degree : detail::sampled_degree;
     const double* nodes = detail::bernstein_nodes(n);
     std::array<double, detail::most_bernstein_degree + 1> values;

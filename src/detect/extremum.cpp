@@ -92,6 +92,7 @@ Finding clear_if(bool known) noexcept
     const double sign = watch.side == Side::above ? 1 : -1;
     const double width = path.h();
     for (const double part : {1.0 / 64, 1.0 / 8, 1.0}) {
+        if (watch.end.s + part * width > path.latest()) break;
         const double beyond = sign * path.value(watch.end.s + part * width).value;
         if (std::fabs(beyond) > watch.touch) return beyond > 0;
         if (beyond == cubic.v1) return false;

@@ -107,6 +107,30 @@ void throw_start_not_finite(std::string_view who, std::size_t component, double 
         fmt::format("{}: the start must be finite, got {} in component {}", who, value, component));
 }
 
+void throw_restart_outside(double t, double t_start, double t_end)
+{
+    throw std::invalid_argument(fmt::format(
+        "restart: t must lie in the run, from {} to before {}, got {}", t_start, t_end, t));
+}
+
+void throw_restart_does_not_fit(std::size_t components, std::size_t found)
+{
+    throw std::invalid_argument(
+        fmt::format("restart: the state has {} components, got {}", components, found));
+}
+
+void throw_end_not_ahead(double t, double t_end)
+{
+    throw std::invalid_argument(fmt::format(
+        "extend: t_end must lie ahead of the run, which is at t = {}, got {}", t, t_end));
+}
+
+void throw_run_is_over(std::string_view who)
+{
+    throw std::invalid_argument(fmt::format(
+        "{}: the run is over, since its result has been taken; start another one", who));
+}
+
 void throw_start_outside_mode(std::string_view who, std::size_t which, std::string_view name,
                               double t, double guard)
 {

@@ -139,6 +139,11 @@ void throw_snapshot_is_no_state(std::string_view what)
     refuse_snapshot(fmt::format("{} has a value that it has in no run of this kind", what));
 }
 
+void throw_snapshot_later(double t, double t_end)
+{
+    refuse_snapshot(fmt::format("it is of t = {}, later than t_end = {} of this run", t, t_end));
+}
+
 std::string plain_type_name(std::string_view written)
 {
     // "... [with T = X]" by GCC, "... [T = X]" by Clang.

@@ -84,7 +84,8 @@ TEST(Snapshot, BelongsToOneKindOfRun)
                                  {.t_end = 4, .stop_at_event = true}}) {
         EXPECT_EQ(refused_by(saved, Ball{}, other).find(ours), 0u);
     }
-    EXPECT_NE(refused_by(saved, Ball{}, {.t_end = 1e-3}).find("the time"), std::string::npos);
+    EXPECT_NE(refused_by(saved, Ball{}, {.t_end = 1e-3}).find("later than t_end"),
+              std::string::npos);
 
     // Files of version 0.1 have another name for `check_inside`.
     Snapshot former = saved;

@@ -71,6 +71,8 @@ public:
     virtual void go_on() noexcept = 0;
     [[nodiscard]] virtual Snapshot save() = 0;
     virtual void restore(const Snapshot& snapshot) = 0;
+    virtual void restart(double t, const X& x, Mode mode) = 0;
+    virtual void extend(double t_end) = 0;
 };
 
 /// Keeps a copy of `setup`. @throws std::invalid_argument as `Simulation` does

@@ -3,6 +3,7 @@
 // How a step calls the flow: by pointer, or inlined.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "ricochet/detail/step_state.hpp"
@@ -28,14 +29,32 @@ struct FlowCaller {
     Instant start;
     Mode mode;
     bool backward;
+    double flow_from, flow_to;  ///< as in `StepState`
     std::uint64_t calls = 0;
     bool fits = true;
 
     FlowCaller(void* door_, const StepState<C>& step)
-        : door(door_), flow(step.flow), start(step.start), mode(step.mode), backward(step.backward)
+        : door(door_),
+          flow(step.flow),
+          start(step.start),
+          mode(step.mode),
+          backward(step.backward),
+          flow_from(step.flow_from),
+          flow_to(step.flow_to)
     {
     }
     [[nodiscard]] double time(double s) const noexcept { return start.plus(backward ? -s : s); }
+    /// The time at which the flow is evaluated for a stage at the time t.
+    [[nodiscard]] double stage_time(double t, double) const noexcept
+    {
+        return std::min(std::max(t, flow_from), flow_to);
+    }
+    template <bool is_end>
+    [[nodiscard]] double stage_time(double t, StageOffset<is_end> s) const noexcept
+    {
+        if constexpr (is_end) return stage_time(t, s.s);
+        return t;
+    }
     void leave(StepState<C>& step) const noexcept
     {
         step.flow_calls += calls;

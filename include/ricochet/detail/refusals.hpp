@@ -41,5 +41,13 @@ namespace ricochet::detail {
 /// @throws std::invalid_argument: the first time event is not ahead of the start.
 [[noreturn]] void throw_time_event_not_ahead(std::string_view who, bool backward, double t,
                                              double found);
+/// @throws std::invalid_argument: a restart outside of the run.
+[[noreturn]] void throw_restart_outside(double t, double t_start, double t_end);
+/// @throws std::invalid_argument: a restart from a state of another dimension.
+[[noreturn]] void throw_restart_does_not_fit(std::size_t components, std::size_t found);
+/// @throws std::invalid_argument: an end that is not ahead.
+[[noreturn]] void throw_end_not_ahead(double t, double t_end);
+/// @throws std::invalid_argument: the result has been handed out.
+[[noreturn]] void throw_run_is_over(std::string_view who);
 
 }  // namespace ricochet::detail

@@ -157,6 +157,13 @@ struct Fehlberg78Tableau {
                                              3.0 / 1400};
 };
 
+/// Offset of a stage in its step, of which the compiler knows whether it is an end.
+template <bool is_end>
+struct StageOffset {
+    double s;  ///< [s]
+    constexpr operator double() const noexcept { return s; }
+};
+
 /// What a step of a method computes: the departure w, its rate at the end, and the error estimate,
 /// the latter two where the method has them.
 template <class X>
@@ -205,7 +212,9 @@ public:
         }
         inner_stages(flow, h, k, std::make_index_sequence<kept_stages>{});
         combine<Weights>(h, k, to.rate, to.w);
-        if constexpr (fsal) flow(RowView<Weights, kept_stages>(h, k), to.rate, h);
+        if constexpr (fsal) {
+            flow(RowView<Weights, kept_stages>(h, k), to.rate, StageOffset<true>{h});
+        }
         if constexpr (with_error) estimate(h, k, to.rate, to.error);
     }
 
@@ -391,12 +400,19 @@ private:
         decltype(weights_of<Row>(0.0)) weights_;
     };
 
+    template <std::size_t i>
+    [[nodiscard, gnu::always_inline]] static constexpr auto offset_of(double h) noexcept
+    {
+        constexpr bool is_end = Tableau::c[i] == 0 || Tableau::c[i] == 1;
+        return StageOffset<is_end>{h * Tableau::c[i]};
+    }
+
     template <class Flow, std::size_t... I>
     [[gnu::always_inline]] static void inner_stages(const Flow& flow, [[maybe_unused]] double h,
                                                     [[maybe_unused]] X* k,
                                                     std::index_sequence<I...>)
     {
-        (flow(RowView<Stage<I + 1>, I>(h, k), k[I], h * Tableau::c[I + 1]), ...);
+        (flow(RowView<Stage<I + 1>, I>(h, k), k[I], offset_of<I + 1>(h)), ...);
     }
 
     template <class Index>

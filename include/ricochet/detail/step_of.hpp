@@ -121,7 +121,7 @@ struct StepOf {
         X& w = of.w;
         X& rate = of.w_rate;
         X& error = of.error;
-        const auto flow = [&](const auto& departure, X& departure_rate, double offset)
+        const auto flow = [&](const auto& departure, X& departure_rate, auto offset)
             __attribute__((always_inline))
         {
             if constexpr (requires { departure.state(0, {}, offset, 0.0); }) {
@@ -138,14 +138,16 @@ struct StepOf {
             }
             ++caller.calls;
             if (caller.backward) {
-                caller.fits &= call(caller, caller.start.plus(-offset), of.room, departure_rate);
+                const double t = caller.stage_time(caller.start.plus(-offset), offset);
+                caller.fits &= call(caller, t, of.room, departure_rate);
                 for_each_component(
                     of.x0, [&](auto i) __attribute__((always_inline)) {
                         of.newest[i] = -departure_rate[i];
                         departure_rate[i] = of.newest[i] - of.rate0[i];
                     });
             } else {
-                caller.fits &= call(caller, caller.start.plus(offset), of.room, departure_rate);
+                const double t = caller.stage_time(caller.start.plus(offset), offset);
+                caller.fits &= call(caller, t, of.room, departure_rate);
                 for_each_component(
                     of.x0, [&](auto i) __attribute__((always_inline)) {
                         of.newest[i] = departure_rate[i];
@@ -239,7 +241,7 @@ struct StepOf {
                 });
         } else {
             ++caller.calls;
-            caller.fits &= call(caller, caller.time(h), of.x1, of.rate1);
+            caller.fits &= call(caller, caller.stage_time(caller.time(h), h), of.x1, of.rate1);
             if (caller.backward) {
                 for_each_component(
                     of.x0, [&](auto i)

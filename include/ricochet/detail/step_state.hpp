@@ -7,6 +7,7 @@
 // whole step and a small state stays in registers from stage to stage.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -35,8 +36,9 @@ struct StepStart {
     Instant t;
     Mode mode = 0;
     X x{};
-    X remainder{};  ///< rounding error of x, not contained in it
-    X rate{};       ///< dx/ds there
+    X remainder{};           ///< rounding error of x, not contained in it
+    X rate{};                ///< dx/ds there
+    bool is_beyond = false;  ///< the rate is that of the double after t
 };
 
 /// A vector like `x`, of zeros.
@@ -75,6 +77,10 @@ struct StepState {
     bool flow_fits = true;  ///< the flow has always given its rate the dimension of the state
     std::uint64_t flow_calls = 0;
     double h = 0;
+    /// Times between which the flow is evaluated: where it jumps at a time event at an end of the
+    /// step, the double beside that end belongs to the step.
+    double flow_from = -std::numeric_limits<double>::infinity();
+    double flow_to = std::numeric_limits<double>::infinity();
 
     X x0, remainder, zero, rate0;
     X w, w_rate1;  ///< at the end; the rate only where the method computes it
@@ -100,6 +106,12 @@ struct StepState {
 
     [[nodiscard]] double in_time(double s) const noexcept { return backward ? -s : s; }
     [[nodiscard]] double time(double s) const noexcept { return start.plus(in_time(s)); }
+    /// The time at which the flow is evaluated for offset s.
+    [[nodiscard]] double flow_time(double s) const noexcept { return flow_at(time(s)); }
+    [[nodiscard]] double flow_at(double t) const noexcept
+    {
+        return std::min(std::max(t, flow_from), flow_to);
+    }
 };
 
 /// The smallest tolerance of a component's error, in place of 0: its reciprocal is a number.

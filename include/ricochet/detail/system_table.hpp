@@ -7,8 +7,11 @@
 // time they have the opposite sign.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 
@@ -62,7 +65,8 @@ struct SystemTable {
     double (*guard)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
     double (*guard_on)(Door, std::size_t which, Mode, double t, const View& x) = nullptr;
     /// Rate of a guard with x' = dxdt: in closed form, else the central difference over 1e-5
-    /// `scale`, at the cost of `calls_of_rate` evaluations of the guard.
+    /// `scale` (near an end of the run `CoreGuard` takes another one), at the cost of
+    /// `calls_of_rate` evaluations of the guard.
     double (*rate)(Door, GuardInMode, ScaledTime, const X& x, const X& dxdt) = nullptr;
     double (*rate_on)(Door, GuardInMode, ScaledTime, const View& x, const RateView& dxdt) = nullptr;
     unsigned calls_of_rate = 0;
@@ -93,11 +97,43 @@ struct SystemTable {
     [[nodiscard]] bool timed() const noexcept { return next_time_event; }
 };
 
+/// The times between which the functions of a system may be called, and work space for a state.
+template <class X>
+struct RunSpan {
+    double from = -std::numeric_limits<double>::infinity();  ///< [s]
+    double to = std::numeric_limits<double>::infinity();     ///< [s]
+    X moved{};
+
+    [[nodiscard]] bool holds(double t, double reach) const noexcept
+    {
+        return t - reach >= from && t + reach <= to;
+    }
+    /// An offset [s] of at most `length` such that twice the offset from t lies inside.
+    [[nodiscard]] double inward(double t, double length) const noexcept
+    {
+        return to - t >= t - from ? std::min(length, (to - t) / 2)
+                                  : -std::min(length, (t - from) / 2);
+    }
+};
+
 /// A table and the door that its functions take.
 template <class X>
 class SystemAt {
 public:
-    SystemAt(const SystemTable<X>& table, void* door) noexcept : table_(&table), door_(door) {}
+    /// @param span  null: functions may be called at any time
+    SystemAt(const SystemTable<X>& table, void* door, RunSpan<X>* span = nullptr) noexcept
+        : table_(&table), door_(door), span_(span)
+    {
+    }
+
+    [[nodiscard]] RunSpan<X>* span() const noexcept { return span_; }
+    [[nodiscard]] double earliest() const noexcept { return span_ ? span_->from : -infinite; }
+    [[nodiscard]] double latest() const noexcept { return span_ ? span_->to : infinite; }
+    /// Whether a central difference over `delta` [s] around t would leave the span.
+    [[nodiscard]] bool is_near_end(double t, double delta) const noexcept
+    {
+        return span_ && !span_->holds(t, delta);
+    }
 
     [[nodiscard]] const SystemTable<X>* operator->() const noexcept { return table_; }
     [[nodiscard]] void* door() const noexcept { return door_; }
@@ -125,8 +161,11 @@ public:
     }
 
 private:
+    static constexpr double infinite = std::numeric_limits<double>::infinity();
+
     const SystemTable<X>* table_;
     void* door_;
+    RunSpan<X>* span_;
 };
 
 /// One guard of a system in one mode, for probes: as `GuardView`, but through the door.
@@ -168,8 +207,11 @@ public:
         ++*calls_;
         return system_->guard_on(system_.door(), at_.which, at_.mode, t, x);
     }
-    [[nodiscard]] double rate(double t, const X& x, const X& dxdt, double scale) const
+    /// @param g  the value there, where it is known
+    [[nodiscard]] double rate(double t, const X& x, const X& dxdt, double scale,
+                              double g = std::numeric_limits<double>::quiet_NaN()) const
     {
+        if (is_cut(t, scale)) return rate_inside(t, x, dxdt, scale, g == g ? g : value(t, x));
         *calls_ += system_->calls_of_rate;
         return system_->rate(system_.door(), at_, {t, scale}, x, dxdt);
     }
@@ -180,6 +222,10 @@ public:
     [[nodiscard, gnu::always_inline]] GuardPoint point(double t, const X& x, const X& dxdt,
                                                        double scale) const
     {
+        if (is_cut(t, scale)) {
+            const double g = value(t, x);
+            return {g, rate_inside(t, x, dxdt, scale, g)};
+        }
         if (!system_->point) return {value(t, x), rate(t, x, dxdt, scale)};
         *calls_ += 1 + system_->calls_of_rate;
         return system_->point(system_.door(), at_, {t, scale}, x, dxdt);
@@ -190,6 +236,33 @@ public:
     }
 
 private:
+    /// Whether the rate is a difference that would leave the span of the run.
+    [[nodiscard]] bool is_cut(double t, double scale) const noexcept
+    {
+        return system_->calls_of_rate > 0 && system_.is_near_end(t, 1e-5 * scale);
+    }
+
+    /// The rate by a difference of second order to one side, inside the span.
+    [[nodiscard, gnu::cold, gnu::noinline]] double rate_inside(double t, const X& x, const X& dxdt,
+                                                               double scale, double g) const
+    {
+        RunSpan<X>& span = *system_.span();
+        const double delta = span.inward(t, 1e-5 * scale);
+        const auto moved = [&](double later) {
+            if (span.moved.size() != x.size()) span.moved = x;
+            move(span.moved, x, at_.backward ? -later : later, dxdt);
+            return value(t + later, span.moved);
+        };
+        const double near = moved(delta) - g;
+        const double far = moved(2 * delta) - g;
+        const double first = near / delta;
+        const double second = (4 * near - far) / (2 * delta);
+        // Of a guard that is flat there only the first has the sign of its departure.
+        const bool flat = first * second < 0 && std::fabs(second) > std::fabs(first);
+        const double slope = std::isfinite(second) && !flat ? second : first;
+        return at_.backward ? -slope : slope;
+    }
+
     SystemAt<X> system_;
     GuardInMode at_;
     std::uint64_t* calls_;

@@ -110,6 +110,7 @@ struct PathProperties {
     bool is_rated = true;        ///< the system gives the guard's rate; else it is a difference
     bool is_polynomial = false;  ///< the step has a polynomial, which continues beyond its end
     bool is_free = false;        ///< and the polynomial costs no evaluation of the flow
+    double latest = std::numeric_limits<double>::infinity();  ///< [s] offset of the end of the run
 };
 
 /// A guard on a step as a function of the offset s in [0, h]: the only access to a motion that a
@@ -123,6 +124,8 @@ public:
     [[nodiscard]] Crossing crossing() const noexcept { return properties_.crossing; }
     [[nodiscard]] bool is_rated() const noexcept { return properties_.is_rated; }
     [[nodiscard]] bool is_polynomial() const noexcept { return properties_.is_polynomial; }
+    /// Offset [s] beyond which the guard must not be evaluated, since the run ends there.
+    [[nodiscard]] double latest() const noexcept { return properties_.latest; }
     /// Whether a root is found more cheaply on the step's polynomial first: the polynomial is free,
     /// and the guard on it is not known to be the cubic through its ends.
     [[nodiscard]] bool foretells() const noexcept
@@ -235,7 +238,8 @@ public:
                      .crossing = guard.crossing(),
                      .is_rated = is_rated(guard),
                      .is_polynomial = has_polynomial(step),
-                     .is_free = interpolates(step)},
+                     .is_free = interpolates(step),
+                     .latest = latest_of(step)},
                     path),
           guard_(&guard),
           step_(&step),
@@ -463,7 +467,23 @@ private:
             }
         }
         const double delta = 1e-5 * step_->h();
-        return {value, (dense_value_at(s + delta) - dense_value_at(s - delta)) / (2 * delta)};
+        if (s - delta >= earliest_of(*step_) && s + delta <= latest()) {
+            return {value, (dense_value_at(s + delta) - dense_value_at(s - delta)) / (2 * delta)};
+        }
+        const double inward = s + delta > latest() ? -delta : delta;
+        const double near = dense_value_at(s + inward) - value;
+        return {value, (4 * near - (dense_value_at(s + 2 * inward) - value)) / (2 * inward)};
+    }
+
+    [[nodiscard]] static double latest_of(const Step& step) noexcept
+    {
+        if constexpr (requires { step.latest(); }) return step.latest();
+        return std::numeric_limits<double>::infinity();
+    }
+    [[nodiscard]] static double earliest_of(const Step& step) noexcept
+    {
+        if constexpr (requires { step.earliest(); }) return step.earliest();
+        return -std::numeric_limits<double>::infinity();
     }
 
     [[nodiscard]] static bool is_rated(const Guard& guard) noexcept
@@ -496,6 +516,16 @@ private:
 
     [[nodiscard]] View view(double s) const { return component_view<false>(*step_, s); }
 
+    /// A time t (1 +- nudge) inside the run.
+    [[nodiscard]] double beside(double t, double nudge) const noexcept
+    {
+        const double later = t * (1 + nudge);
+        if constexpr (requires { step_->inside(t); }) {
+            if (step_->inside(later) != later) return step_->inside(t * (1 - nudge));
+        }
+        return later;
+    }
+
     /// Total change of the guard at offset s under relative changes of the time and
     /// of each component of the state in turn.
     [[nodiscard]] double nudged(double s, double nudge)
@@ -504,7 +534,7 @@ private:
         if (!(placed_ == s)) place(s);
         State& x = space_->x;
         const double g = guard_->value(t, x);
-        double changes = std::fabs(guard_->value(t * (1 + nudge), x) - g);
+        double changes = std::fabs(guard_->value(beside(t, nudge), x) - g);
         detail::for_each_component(x, [&](auto i) {
             const double kept = x[i];
             if (kept == 0) return;

@@ -175,6 +175,8 @@ public:
                 piece.series.resize(numbers);
                 for (double& number : piece.series) visit(number);
             }
+            visit(piece.end_time);
+            if (piece.end_time == piece.end_time) visit.state(piece.end);
         }
     }
 
@@ -214,21 +216,40 @@ public:
         if (pieces_.empty()) pieces_.reserve(from.pieces_.size());
         for (std::size_t i = pieces_.size(); i < from.pieces_.size(); ++i) {
             const auto& piece = from.pieces_[i];
-            pieces_.push_back({.t = piece.t,
-                               .length = piece.length,
-                               .h = piece.h,
-                               .backward = piece.backward,
-                               .mode = piece.mode,
-                               .nodes = piece.nodes,
-                               .x0 = convert(piece.x0),
-                               .remainder = convert(piece.remainder),
-                               .rate0 = convert(piece.rate0),
-                               .departures = piece.departures,
-                               .slopes = piece.slopes,
-                               .w = all(piece.w, piece.departures),
-                               .slope = all(piece.slope, piece.slopes),
-                               .series = piece.series});
+            pieces_.push_back(
+                {.t = piece.t,
+                 .length = piece.length,
+                 .h = piece.h,
+                 .backward = piece.backward,
+                 .mode = piece.mode,
+                 .nodes = piece.nodes,
+                 .x0 = convert(piece.x0),
+                 .remainder = convert(piece.remainder),
+                 .rate0 = convert(piece.rate0),
+                 .departures = piece.departures,
+                 .slopes = piece.slopes,
+                 .w = all(piece.w, piece.departures),
+                 .slope = all(piece.slope, piece.slopes),
+                 .series = piece.series,
+                 .end_time = piece.end_time,
+                 .end = piece.end_time == piece.end_time ? convert(piece.end) : State{}});
         }
+    }
+
+    /// Declares x the state before an event at time t, at which the last step ends.
+    void end_at(double t, const State& x)
+    {
+        pieces_.back().end = x;
+        pieces_.back().end_time = t;
+    }
+
+    /// Drops what lies after time t.
+    void cut(double t)
+    {
+        while (!pieces_.empty() && offset(pieces_.back(), t) <= 0) pieces_.pop_back();
+        if (pieces_.empty()) return;
+        Piece& last = pieces_.back();
+        last.length = std::min(last.length, offset(last, t));
     }
 
     /// Keeps only the first `size` steps.
@@ -250,6 +271,8 @@ private:
         std::size_t departures = 0, slopes = 0;  ///< numbers of `w` and `slope`
         std::array<State, 3> w{}, slope{};
         std::vector<double> series{};
+        double end_time = std::numeric_limits<double>::quiet_NaN();  ///< [s] of `end`
+        State end{};  ///< the state before an event, as its reset has seen it
     };
 
     [[nodiscard]] static double offset(const Piece& piece, double t) noexcept
@@ -267,6 +290,7 @@ private:
 
     [[nodiscard]] static State evaluate(const Piece& piece, double t)
     {
+        if (offset(piece, t) >= offset(piece, piece.end_time)) return piece.end;
         DenseParts<State> parts{.nodes = piece.nodes,
                                 .h = piece.h,
                                 .x0 = &piece.x0,
@@ -369,6 +393,9 @@ namespace detail {
 [[noreturn]] void throw_snapshot_does_not_fit();
 /// @throws std::invalid_argument because `what` has a value that no run gives it.
 [[noreturn]] void throw_snapshot_is_no_state(std::string_view what);
+
+/// @throws std::invalid_argument because the snapshot was taken after the end of the run.
+[[noreturn]] void throw_snapshot_later(double t, double t_end);
 
 /// Text that contains the name of a type as the compiler writes it.
 template <class T>

@@ -353,8 +353,10 @@ public:
         return goes_on;
     }
 
-    /// Advances to the next sample time, or to the end of the next step that holds events;
-    /// `t`, `x` and `mode` are those there, after the events. False: the run has ended, and
+    /// Advances to the next sample time or event, recorded events included. What happens at one
+    /// instant is shown once; `t`, `x` and `mode` are those there, after the events, and `run` may
+    /// already hold what comes after them in the same step. Events whose states are not recorded
+    /// (`Options::event_states`) are shown at the end of their step. False: the run has ended, and
     /// everything that happened in it has been shown.
     bool advance()
     {
@@ -405,6 +407,32 @@ public:
     void restore(const Snapshot& snapshot)
     {
         loop_->restore(snapshot);
+        refresh();
+    }
+
+    /// Goes on from (t, x) in a mode, as from a start: guards are armed and the first step is
+    /// estimated again, and a time event at t belongs to the past. For interventions and
+    /// co-simulation: t may be any time from t_start to before t_end, also one that `advance` has
+    /// stopped at inside a step; what was recorded after it is dropped. A run that has ended goes
+    /// on, unless its result was taken.
+    ///
+    /// @throws std::invalid_argument if t lies outside of the run, or `integrate` would refuse such
+    /// a start; then nothing has changed.
+    void restart(double t, const X& x, Mode mode)
+    {
+        loop_->restart(t, detail::core_state(x), mode);
+        if constexpr (!same) shown_.run = {};
+        refresh();
+    }
+    void restart(double t, const X& x) { restart(t, x, mode()); }
+
+    /// Moves the end of the run to `t_end`, which must lie ahead of the last step. A run that has
+    /// reached its end goes on, unless its result was taken.
+    ///
+    /// @throws std::invalid_argument if it does not; then nothing has changed.
+    void extend(double t_end)
+    {
+        loop_->extend(t_end);
         refresh();
     }
 

@@ -46,6 +46,8 @@ public:
     [[nodiscard]] virtual Mode solution_mode(double t) const = 0;
     [[nodiscard]] virtual std::string save() = 0;
     virtual void restore(std::string_view text) = 0;
+    virtual void restart(double t, const double* x, Mode mode) = 0;
+    virtual void extend(double t_end) = 0;
 };
 
 /// A run from x0, whose size is the dimension of the system.

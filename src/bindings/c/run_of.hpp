@@ -22,7 +22,8 @@ class RunOf final : public AnyRun {
 public:
     RunOf(std::shared_ptr<const CallbackSystem> system, const X& x0, const RunOptions& options)
         : callbacks_(std::move(system), x0, options.finders),
-          loop_(detail::make_loop(setup_of(x0.size(), options), x0, options.options))
+          loop_(detail::make_loop(setup_of(x0.size(), options), x0, options.options)),
+          like_(x0)
     {
     }
 
@@ -89,6 +90,13 @@ public:
         loop_->restore(snapshot_from_text(text));
         if (loop_->ended()) loop_->bring_up_to_date();
     }
+    void restart(double t, const double* x, Mode mode) override
+    {
+        X start = like_;
+        std::copy_n(x, start.size(), start.begin());
+        loop_->restart(t, start, mode);
+    }
+    void extend(double t_end) override { loop_->extend(t_end); }
 
 private:
     /// Brings the run up to date when it has ended, so that the last samples are there.
@@ -122,6 +130,7 @@ private:
 
     CallbackSetup<X> callbacks_;
     std::unique_ptr<detail::AnyLoop<X>> loop_;
+    X like_;
 };
 
 /// A run with states of type X, from a start of `dimension` doubles.

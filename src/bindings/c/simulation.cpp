@@ -288,4 +288,27 @@ rc_status rc_restore(rc_simulation* simulation, const void* bytes, size_t size)
         at.interrupted = RC_RUNNING;
     });
 }
+
+rc_status rc_restart(rc_simulation* simulation, double t, const double* x, size_t n, rc_mode mode)
+{
+    return with(simulation, [&](rc_simulation& at) {
+        if (!x) throw_null("rc_restart, x");
+        require_dimension("rc_restart", n, at.dimension);
+        try {
+            at.run->restart(t, x, mode);
+        } catch (const CallbackFailed& failed) {
+            at.failed = failed;
+            throw;
+        }
+        at.interrupted = RC_RUNNING;
+    });
+}
+
+rc_status rc_extend(rc_simulation* simulation, double t_end)
+{
+    return with(simulation, [&](rc_simulation& at) {
+        at.run->extend(t_end);
+        at.interrupted = RC_RUNNING;
+    });
+}
 }

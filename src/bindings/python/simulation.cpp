@@ -212,7 +212,13 @@ public:
             loop_->run_to_end();
             return true;
         });
-        return finish();
+        const Turn turn(in_use_, "Simulation");
+        if (!finished_) {
+            finished_.emplace(names_);
+            finished_->record = record_of(Run<State>(loop_->bring_up_to_date()));
+            may_go_on_ = true;
+        }
+        return *finished_;
     }
     [[nodiscard]] PyRun finish()
     {
@@ -221,7 +227,16 @@ public:
             finished_.emplace(names_);
             finished_->record = record_of(loop_->finish());
         }
+        may_go_on_ = false;
         return *finished_;
+    }
+    void restart(double t, const State& x, std::optional<Mode> mode)
+    {
+        intervene([&] { loop_->restart(t, x, mode.value_or(loop_->mode())); });
+    }
+    void extend(double t_end)
+    {
+        intervene([&] { loop_->extend(t_end); });
     }
 
     [[nodiscard]] double t()
@@ -287,6 +302,25 @@ private:
         return goes_on;
     }
 
+    /// Lets the run go on from another place, or to another end.
+    template <class Work>
+    void intervene(const Work& work)
+    {
+        const Turn turn(in_use_, "Simulation");
+        if (finished_ && !may_go_on_) {
+            throw std::runtime_error("Simulation: found finished, expected going on");
+        }
+        try {
+            work_freely(door_->is_free(), work);
+        } catch (const PythonError& error) {
+            PyRun run = names_;
+            run.record = record_of(Run<State>(loop_->run()));
+            raise_with(error, std::move(run));
+        }
+        finished_.reset();
+        may_go_on_ = false;
+    }
+
     [[noreturn]] void end_with(const PythonError& error)
     {
         finished_.emplace(names_);
@@ -300,6 +334,7 @@ private:
     OwnedSetup setup_;
     std::unique_ptr<Loop> loop_;
     std::optional<PyRun> finished_;
+    bool may_go_on_ = false;  ///< it has been run to its end, but its loop is still there
     std::atomic<bool> in_use_ = false;
 };
 
@@ -315,13 +350,16 @@ void bind_runs(py::module_& module)
         .def("step", &PySimulation::step,
              "Takes one step, with whatever events it holds. False: the run has ended.")
         .def("advance", &PySimulation::advance,
-             "Advances to the next event or sample time. False: the run has ended.")
+             "Advances to the next event, also one that is only recorded, or sample time; what "
+             "happens at one instant is shown once. False: the run has ended.")
         .def("run_to_end", &PySimulation::run_to_end, "Advances to the end, and returns the Run.")
         .def("finish", &PySimulation::finish, "Ends the run here, and returns what was computed.")
         .def("save", &PySimulation::save, "All that the future depends on, as a Snapshot.")
         .def("restore", &PySimulation::restore,
              "Continues where the snapshot of a run of the same system was taken, with the same "
              "bits.")
+        .def("_restart", &PySimulation::restart)
+        .def("_extend", &PySimulation::extend)
         .def_property_readonly("t", &PySimulation::t, "The time.")
         .def_property_readonly("x", &PySimulation::x, "The state, which may be kept.")
         .def_property_readonly("mode", &PySimulation::mode, "The mode.")
