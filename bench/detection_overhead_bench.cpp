@@ -44,9 +44,9 @@ Eigen::VectorXd dynamic(double a, double b)
     return x;
 }
 
-Network stored(const char* file)
+BareNetwork stored(const char* file)
 {
-    return Network(load_model(std::filesystem::path(RICOCHET_MODELS) / file));
+    return BareNetwork(load_model(std::filesystem::path(RICOCHET_MODELS) / file));
 }
 
 /// Times a run without events, and reports the cost of one step and its counts.
@@ -177,8 +177,8 @@ void register_all()
         state.counters["time/step"] = benchmark::Counter(
             batch, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
     });
-    const Network any_step = stored("bouncing-ball.safetensors");
-    const Network fixed_step = stored("bouncing-ball-step-0.01.safetensors");
+    const BareNetwork any_step = stored("bouncing-ball.safetensors");
+    const BareNetwork fixed_step = stored("bouncing-ball-step-0.01.safetensors");
     const Verified<Extremum> gate_1x16(any_step);
     const Verified<Extremum> gate_5x16(fixed_step);
 

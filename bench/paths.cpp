@@ -113,7 +113,7 @@ Path ball_as_scene()
 
 Path by_network()
 {
-    const Network network(load_model(RICOCHET_MODELS "/bouncing-ball-step-0.01.safetensors"));
+    const BareNetwork network(load_model(RICOCHET_MODELS "/bouncing-ball-step-0.01.safetensors"));
     const BouncingBall ball({.gravity = 9.81, .restitution = 0.9});
     return [=] {
         auto result = integrate(ball, BouncingBall::State{10, 0}, {.t_end = 5, .step = 0.01},

@@ -118,7 +118,7 @@ std::string Case::name() const
 
 CaseList standard_cases(const std::filesystem::path& models)
 {
-    const Network network(load_model(models / "bouncing-ball-step-0.01.safetensors"));
+    const BareNetwork network(load_model(models / "bouncing-ball-step-0.01.safetensors"));
     CaseList cases;
     for (const BallProblem& problem : {b1(), b2(), b3()}) {
         add_methods(cases, problem, "ends", Ends{});

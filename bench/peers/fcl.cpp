@@ -4,6 +4,7 @@
 #include <fcl/geometry/bvh/BVH_model.h>
 #include <fcl/narrowphase/distance.h>
 
+#include <memory>
 #include <vector>
 
 namespace ricochet::bench {

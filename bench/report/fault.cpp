@@ -4,6 +4,7 @@
 // Methods for any system and CVODE's BDF take the same equations, in the logarithms of the slip
 // rates, by the same functions.
 #include <algorithm>
+#include <memory>
 #include <span>
 
 #include "cells.hpp"

@@ -1,5 +1,6 @@
 #include "gas.hpp"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 

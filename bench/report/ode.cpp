@@ -4,6 +4,7 @@
 // which a pair overlaps and approaches.
 #include <ode/ode.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "cells.hpp"

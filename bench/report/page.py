@@ -244,7 +244,7 @@ def cell_table(rows):
 
 THINGS = {"flow": "the flow alone", "floor": "a guard and a reset: the ball",
           "modes": "the ball with two modes", "recording": "the ball, every step kept, 200 samples",
-          "planning": "the ball with a bound, Planned", "network": "the ball, Verified<Network>",
+          "planning": "the ball with a bound, Planned", "network": "the ball, Verified<BareNetwork>",
           "taylor": "the ball, Taylor", "sensitivities": "the ball and its derivatives",
           "friction": "a friction oscillator, set-valued"}
 

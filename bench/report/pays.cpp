@@ -103,7 +103,7 @@ std::size_t solve()
         .events.size();
 #elif defined(RICOCHET_PAYS_network)
     static const Verified<> detector{
-        Network(load_model(RICOCHET_MODELS "/bouncing-ball.safetensors"))};
+        BareNetwork(load_model(RICOCHET_MODELS "/bouncing-ball.safetensors"))};
     static const BouncingBall ball({.gravity = 9.81, .restitution = 0.9});
     return integrate(ball, start, options, ErrorControlled<Dopri5>{}, detector).events.size();
 #elif defined(RICOCHET_PAYS_friction)

@@ -5,6 +5,7 @@
 #include <sundials/sundials_version.h>
 
 #include <algorithm>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>

@@ -22,7 +22,6 @@
 #include <concepts>
 #include <cstddef>
 #include <limits>
-#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -224,10 +223,10 @@ struct MonitorOptions {
 ///
 /// After construction nothing is allocated for up to 8 guards and states of fixed size, except for
 /// recorded events, and the merged state of a reset of several guards.
-template <class System, class X, class Detector = Extremum, class Locator = Newton>
-requires Flowing<System, X> && StateVector<X>
+template <class System, class X = detail::DeclaredState<System>, class Detector = Extremum,
+          class Locator = Newton>
 class EventMonitor {
-    static_assert(detail::check_declarations<System, X>());
+    static_assert(detail::check_system<System, X>());
 
 public:
     /// Type of the states of `cut` and `events`: contiguous doubles.
@@ -235,21 +234,43 @@ public:
         std::conditional_t<detail::is_small<detail::CoreState<X>>,
                            std::array<double, detail::fixed_size<X>()>, std::vector<double>>;
 
-    /// Keeps a reference to the system.
+    /// Keeps a reference to the system, and a temporary one itself.
     /// @param like  a state of the dimension of the motion
     /// @throws std::invalid_argument for declarations that contradict each other, and a system
     /// without events.
     explicit EventMonitor(const System& system, const X& like, const MonitorOptions& options = {},
                           const Detector& detector = {}, const Locator& locator = {})
-        : parts_(std::make_unique<Parts>(system, like, detector, locator)),
+        : parts_(new Parts(system, like, detector, locator)),
           monitor_(detail::make_monitor<Core>(parts_->setup(), detail::core_state(like),
                                               engine_options(options), options.cut_at_all)),
           room_(detail::core_state(like))
     {
         shown_.cut.fired.reserve(monitor_->cut().fired.capacity());
     }
-    explicit EventMonitor(System&&, const X&, const MonitorOptions& = {}, const Detector& = {},
-                          const Locator& = {}) = delete;
+    explicit EventMonitor(System&& system, const X& like, const MonitorOptions& options = {},
+                          const Detector& detector = {}, const Locator& locator = {})
+        : EventMonitor(detail::Owner<const System>(new System(std::move(system))), like, options,
+                       detector, locator)
+    {
+    }
+    /// {10, 0, 1} for two components, or {10}, where the others would silently be zero.
+    template <std::size_t given>
+    requires(detail::fixed_size<X>() > 0 && detail::fixed_size<X>() != given) explicit EventMonitor(
+        const System&, const double (&)[given], const MonitorOptions& = {}, const Detector& = {},
+        const Locator& = {})
+        : room_(detail::core_state(X{}))
+    {
+        static_assert(
+            given == detail::fixed_size<X>(),
+            "ricochet: found a start with another number of components than System::State");
+    }
+    template <std::size_t given>
+    requires(detail::fixed_size<X>() > 0 && detail::fixed_size<X>() != given) explicit EventMonitor(
+        System&& system, const double (&like)[given], const MonitorOptions& options = {},
+        const Detector& detector = {}, const Locator& locator = {})
+        : EventMonitor(std::as_const(system), like, options, detector, locator)
+    {
+    }
 
     /// Arms all guards at a state that no event has produced: at the start, and after the host has
     /// changed the state. May return a cut immediately, for a guard that is about to be crossed.
@@ -369,6 +390,8 @@ public:
     [[nodiscard]] Outcome outcome() const noexcept { return monitor_->run().outcome; }
     /// The guard that ended the run, or `no_guard`.
     [[nodiscard]] std::size_t guard() const noexcept { return monitor_->run().guard; }
+    /// Text of the `Stop` that ended the run.
+    [[nodiscard]] const std::string& reason() const noexcept { return monitor_->run().reason; }
     [[nodiscard]] const Statistics& statistics() const noexcept
     {
         return monitor_->run().statistics;
@@ -403,6 +426,13 @@ public:
     }
 
 private:
+    EventMonitor(detail::Owner<const System> system, const X& like, const MonitorOptions& options,
+                 const Detector& detector, const Locator& locator)
+        : EventMonitor(*system, like, options, detector, locator)
+    {
+        own_ = std::move(system);
+    }
+
     /// Type of the states of the engine.
     using Core = detail::CoreState<X>;
     static constexpr bool same = std::is_same_v<State, Core>;
@@ -500,8 +530,9 @@ private:
         return room_;
     }
 
-    std::unique_ptr<Parts> parts_;
-    std::unique_ptr<detail::AnyMonitor<Core>> monitor_;
+    detail::Owner<const System> own_;  ///< where it was a temporary
+    detail::Owner<Parts> parts_;
+    detail::Owner<detail::AnyMonitor<Core>> monitor_;
     Core room_;
     mutable Shown shown_;
 };

@@ -100,6 +100,9 @@ typedef struct rc_guard_info {
     int32_t degree;      /**< of the guard as a polynomial in (t, x) together; 0: not known */
     double touch;        /**< |g| up to which a zero of its rate counts as a touch */
     double lipschitz;    /**< largest change per unit of path, see speed_bound; 0 means 1 */
+    int32_t at_start;    /**< 1: it fires at the start of a run, and */
+    int32_t at_entry;    /**< 1: where its mode begins by a change of mode, if it is beyond its
+                            surface there, or on it and does not move inside; not for RC_EITHER */
 } rc_guard_info;
 
 /* Callbacks. Each returns 0 for success. Any other number is an error of the program's own: the
@@ -138,6 +141,10 @@ typedef int (*rc_enabled_fn)(void* user, size_t which, rc_mode mode, double t, c
 /** Writes the first time event after t (not at t) into `next`, or INFINITY if there is none; for
  *  runs backward in time the last one before t, or -INFINITY. */
 typedef int (*rc_time_event_fn)(void* user, double t, double* next);
+/** Writes the next time event of a timer in the state into `next`: t, if it is due now, a time
+ *  after it, or INFINITY. It is asked at the start and after every set of events. */
+typedef int (*rc_timer_fn)(void* user, rc_mode mode, double t, const double* x, size_t n,
+                           double* next);
 /** Same as rc_reset_fn, for a time event. */
 typedef int (*rc_time_reset_fn)(void* user, rc_mode* mode, double t, double* x, size_t n);
 /** Writes a bound of guard `which`, valid at (t, x), into `bound`. */
@@ -179,7 +186,30 @@ typedef struct rc_callbacks {
     rc_bound_fn upper_bound; /**< guard <= this; null: none is known */
 
     rc_parameter_fn parameter; /**< null: the gate's parameters are not compared */
+
+    /* Other ways to say when time events happen; at most one of all, next_time_event included. */
+    rc_timer_fn next_time_event_at; /**< of timers in the state */
+    const double* time_events;      /**< a list, copied, in any order, from the start to the end of
+                                       a run, both included, and as often as each is listed */
+    size_t time_event_count;        /**< number of them */
+    double time_event_period;       /**< [s] above 0: a clock that ticks at all times phase + k
+                                       period, from the start to the end, both included */
+    double time_event_phase;        /**< [s] */
 } rc_callbacks;
+
+/** Ends the run at the event whose reset, or time_reset, returns the result of this call:
+ *
+ *      if (*level <= 0) return rc_stop("the tank is empty");
+ *
+ *  The outcome is RC_STOPPED_BY_EVENT, state and mode are what the callback has written, and
+ *  rc_reason() returns a copy of the text, which may be null. */
+RC_API int rc_stop(const char* reason);
+
+/** The first tick phase + k period after t, for the whole numbers k; NaN unless period is positive.
+ *  For callbacks of timers that contain a clock. */
+RC_API double rc_next_tick(double period, double phase, double t);
+/** The first of `count` ascending times after t, or INFINITY. */
+RC_API double rc_next_listed(const double* times, size_t count, double t);
 
 /** Creates a system; `*system` is null after a failure. The callbacks struct need not be kept.
  *  RC_INVALID: no flow, no dimension, guards without a callback. RC_WRONG_SIZE, RC_NO_MEMORY. The
@@ -222,7 +252,8 @@ typedef enum rc_locator { RC_NEWTON = 0, RC_BISECTION = 1, RC_TOMS748 = 2 } rc_l
 typedef struct rc_options {
     size_t size;           /**< sizeof(rc_options) */
     double t_start;        /**< [s], 0 */
-    double t_end;          /**< [s]; before t_start: backward in time */
+    double t_end;          /**< [s]; before t_start: backward in time; infinite where a guard with
+                              stop_after, stop_at_event or max_steps ends the run */
     rc_mode mode;          /**< at the start, 0 */
     int32_t method;        /**< an rc_method, RC_DOPRI5 */
     int32_t fixed_step;    /**< 1: steps of the length `step`; 0: error control */
@@ -253,6 +284,9 @@ typedef struct rc_options {
     const char* gate;     /**< path of the model for detectors with a gate, else null */
     const double* component_atol; /**< one for each component in place of atol, copied; null */
     size_t component_count;       /**< number of them, 0 */
+    int32_t continues; /**< 0; 1: t_start belongs to the run before: nothing happens there by the
+                          list or the clock of the system, nor by at_start of its guards */
+    int32_t reserved;  /**< 0 */
 } rc_options;
 
 /** Fills in the defaults; `size` is sizeof(rc_options), and t_end becomes NaN. RC_WRONG_SIZE. */
@@ -349,6 +383,13 @@ RC_API rc_outcome_code rc_outcome(rc_simulation* simulation);
 RC_API const char* rc_outcome_name(rc_outcome_code outcome);
 /** One sentence about an outcome, with the remedy. */
 RC_API const char* rc_outcome_text(rc_outcome_code outcome);
+/** The text of rc_stop() that ended the run; empty if none did, and for a handle that cannot be
+ *  used. Valid until the next call that advances, restores or frees the simulation. */
+RC_API const char* rc_reason(rc_simulation* simulation);
+/** A sentence about the run so far: that about its outcome with the text of rc_stop(), and the
+ *  guards that were armed beyond their surface. Valid until the next call with this simulation;
+ *  empty for a handle that cannot be used. */
+RC_API const char* rc_describe(rc_simulation* simulation);
 
 /** Counts over a run. */
 typedef struct rc_statistics {
@@ -371,14 +412,20 @@ typedef struct rc_statistics {
     uint64_t suppressed; /**< repeats of an event inside its own window */
     uint64_t disabled;   /**< crossings that `enabled` rejected */
     /* Steps without an event, by the evidence for it. */
-    uint64_t proved;           /**< a bound or a polynomial excludes a root */
-    uint64_t checked;          /**< the ends and the extremum inside were examined */
-    uint64_t gated;            /**< a calibrated gate skipped the check */
-    uint64_t assumed;          /**< only the ends were examined */
-    size_t guard;              /**< the guard that ended the run, or RC_NO_GUARD */
-    size_t other_guard;        /**< of two conflicting resets the second, or RC_TIME_EVENT_RESET */
-    uint64_t unmet_conditions; /**< events whose guard had not left its side in any state found */
+    uint64_t proved;             /**< a bound or a polynomial excludes a root */
+    uint64_t checked;            /**< the ends and the extremum inside were examined */
+    uint64_t gated;              /**< a calibrated gate skipped the check */
+    uint64_t assumed;            /**< only the ends were examined */
+    size_t guard;                /**< the guard that ended the run, or RC_NO_GUARD */
+    size_t other_guard;          /**< the second of two conflicting resets, or of a cycle;
+                                    RC_TIME_EVENT_RESET */
+    uint64_t unmet_conditions;   /**< events whose guard had not left its side in any state found */
     uint64_t ineffective_resets; /**< events whose reset changed neither the state nor the mode */
+    size_t declined_guard;       /**< of the last of them that was asked twice, or RC_NO_GUARD */
+    uint64_t either_relays;      /**< events of RC_EITHER from which another mode turns back */
+    size_t relay_guard;          /**< of the last of them, or RC_NO_GUARD */
+    uint64_t armed_beyond; /**< guards with an effect that were beyond their surface at the start or
+                              where a mode enabled them, and wait until they have returned */
 } rc_statistics;
 
 /** Fills in the counts. RC_WRONG_SIZE, RC_BAD_HANDLE, RC_BUSY. */
@@ -632,6 +679,8 @@ RC_API rc_status rc_monitor_side(rc_monitor* monitor, size_t which, rc_side* sid
 RC_API rc_outcome_code rc_monitor_outcome(rc_monitor* monitor);
 /** The guard that ended the run, or RC_NO_GUARD. */
 RC_API size_t rc_monitor_guard(rc_monitor* monitor);
+/** The text of rc_stop() that ended the run, like rc_reason. */
+RC_API const char* rc_monitor_reason(rc_monitor* monitor);
 /** Describes the last failure of a callback in this monitor, like rc_callback_failure; null: in
  * this thread. */
 RC_API rc_status rc_monitor_callback_failure(rc_monitor* monitor, rc_callback_error* error);

@@ -15,9 +15,9 @@ from ._network import Network
 from ._plot import plot
 from ._ready import (BouncingBall, CoulombOscillator, ImpactOscillator, Pendulum, StickSlip,
                      Thermostat)
-from ._ricochet import Run, Snapshot, Solution
+from ._ricochet import Run, Snapshot, Solution, Times
 from ._run import Kind, Simulation, integrate
-from ._system import Guard, System, guard
+from ._system import Guard, Stop, System, every, guard
 from ._training import Certified, Trained, certify, train_classifier, train_gate
 
 __version__ = "0.1.0"
@@ -25,7 +25,7 @@ __version__ = "0.1.0"
 __all__ = [
     "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Certified", "Compiled",
     "CoulombOscillator", "Cut", "Ensemble", "Guard", "ImpactOscillator", "Kind", "Monitor", "Network", "OdeResult",
-    "Pendulum", "Run", "Simulation", "Snapshot", "Solution", "StickSlip", "System", "Thermostat",
-    "Trained", "Verdict", "certify", "ensemble", "guard", "integrate", "plot",
+    "Pendulum", "Run", "Simulation", "Snapshot", "Solution", "StickSlip", "Stop", "System", "Thermostat",
+    "Times", "Trained", "Verdict", "certify", "ensemble", "every", "guard", "integrate", "plot",
     "row_seed", "solve_ivp", "train_classifier", "train_gate",
 ]

@@ -44,6 +44,8 @@ class Run:
     @property
     def message(self) -> str: ...
     @property
+    def reason(self) -> str: ...
+    @property
     def success(self) -> bool: ...
     @property
     def t(self) -> float: ...
@@ -88,7 +90,8 @@ class Guard:
         rate: Optional[Union[Callable[..., Any], Compiled]] = None,
         enabled: Optional[Callable[..., Any]] = None, in_modes: Optional[Sequence] = None,
         unilateral: bool = False, boolean: bool = False, degree: int = 0, touch: float = 0.0,
-        stop_after: int = 0, speed_bound: Optional[Union[Callable[..., Any], Compiled]] = None,
+        stop_after: int = 0, at_start: bool = False, at_entry: bool = False,
+        speed_bound: Optional[Union[Callable[..., Any], Compiled]] = None,
         acceleration_bound: Optional[Union[Callable[..., Any], Compiled]] = None,
         lower_bound: Optional[Union[Callable[..., Any], Compiled]] = None,
         upper_bound: Optional[Union[Callable[..., Any], Compiled]] = None,
@@ -104,12 +107,25 @@ class Guard:
 
 def guard(value: Optional[Callable[..., Any]] = None, **options: Any) -> Any: ...
 
+class Stop(Exception):
+    reason: str
+    after: Any
+    def __init__(self, reason: str, after: Any = None) -> None: ...
+
+class Times:
+    def __init__(self, times: Sequence[float]) -> None: ...
+    def next(self, t: float) -> float: ...
+    def previous(self, t: float) -> float: ...
+    def count(self, t: float) -> int: ...
+
+def every(period: float, phase: float = 0.0, name: str = "every") -> Times: ...
+
 class System:
     flow: Any
     guards: Sequence[Any]
     modes: Any
     name: Optional[str]
-    time_events: Optional[Iterable[float]]
+    time_events: Union[None, Times, Iterable[float]]
     changes_dimension: bool
     parameters: Optional[Mapping[str, float]]
     formula: Optional[int]
@@ -175,7 +191,7 @@ def ensemble(system: Union[_Ready, type[_Ready]], table: Any, t_end: float, *,
 def row_seed(seed: int, index: int) -> int: ...
 
 def integrate(system: Union[System, _Ready], x0: ArrayLike, t_end: float, *,
-              t_start: float = 0.0, mode: Any = ..., method: str = "dopri5", fixed: bool = False,
+              t_start: float = 0.0, continues: bool = False, mode: Any = ..., method: str = "dopri5", fixed: bool = False,
               step: float = 0.0, rtol: float = 1e-8, atol: ArrayLike = 1e-10, h_min: float = 0.0,
               h_max: float = ..., event_tolerance: float = 0.0, event_rtol: float = 0.0,
               event_window: float = 0.0, check_inside: bool = True, stop_at_event: bool = False,

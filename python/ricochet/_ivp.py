@@ -46,7 +46,9 @@ _OWN_MESSAGES = {
 _WORDS = (("t_end - t_start", "t_span[1] - t_span[0]"), ("t_end", "t_span[1]"),
           ("t_start", "t_span[0]"), ("h_max", "max_step"), ("the start must", "y0 must"),
           ("the start lies", "y0 lies"), ("expected guard >= 0", "expected a value >= 0"),
-          ("; g >= 0 bounds", "; event >= 0 bounds"), ("step must", "first_step must"))
+          ("; g >= 0 bounds", "; event >= 0 bounds"), ("step must", "first_step must"),
+          ("a guard with stop_after, stop_at_event, or max_steps, also beside a reset that ends the "
+           "run by Stop", "a terminal event or max_steps"))
 
 
 def _in_our_words(error, events):

@@ -34,9 +34,9 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
     components : sequence of int
         Components to draw; by default all.
     labels : sequence of str
-        Their labels.
+        Their labels: in a legend, or at the axis where one component is drawn.
     phase : (int, int)
-        Draws the second component over the first instead.
+        Draws the second component over the first instead, with their labels at the axes.
     events : bool
         Whether events are marked, before and after their resets.
     ax : matplotlib.axes.Axes
@@ -62,11 +62,14 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
     components = range(x.shape[1]) if components is None else components
     components = list(components)
     labels = [f"x[{c}]" for c in components] if labels is None else list(labels)
-    if phase is None and len(labels) != len(components):
+    if len(labels) != len(components):
         raise ValueError(f"labels: found {len(labels)}, expected one for each of "
                          f"{len(components)} components")
     if phase is not None:
         first, second = phase
+        label_of = dict(zip(components, labels))
+        ax.set_xlabel(label_of.get(first, f"x[{first}]"))
+        ax.set_ylabel(label_of.get(second, f"x[{second}]"))
         line, = ax.plot(x[:, first], x[:, second])
         for side in ("before", "after"):
             ax.plot(marks[side][:, first], marks[side][:, second], ".", color=line.get_color())
@@ -78,4 +81,6 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
     ax.set_xlabel("t")
     if len(labels) > 1:
         ax.legend()
+    elif labels:
+        ax.set_ylabel(labels[0])
     return ax

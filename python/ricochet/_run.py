@@ -105,9 +105,13 @@ def integrate(system, x0, t_end, **options):
     system : System or a ready one
     x0 : array_like, shape (n,)
     t_end : float
-        Before ``t_start``: backward in time.
+        Before ``t_start``: backward in time. Infinite where a guard with ``stop_after``,
+        ``stop_at_event`` or ``max_steps`` ends the run.
     t_start : float
         Default 0.
+    continues : bool
+        The run goes on where another has ended: nothing happens at ``t_start`` by ``time_events``
+        or by ``at_start`` of guards.
     mode
         The mode at the start; by default the first, or that of the ready system.
     method : str

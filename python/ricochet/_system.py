@@ -1,9 +1,8 @@
 """Hybrid systems, as classes or from functions."""
 
-from bisect import bisect_left, bisect_right
+import inspect
 from collections.abc import Iterator
 from functools import lru_cache
-from math import inf
 from numbers import Real
 from types import MethodType
 
@@ -19,9 +18,36 @@ MOST_EVENTS = 2**32 - 1
 #: What a guard is told by arguments, and what events of `solve_ivp` are told by attributes.
 _OF_GUARDS = {name: name for name in (
     "value", "direction", "reset", "rest", "rate", "enabled", "in_modes", "unilateral", "boolean",
-    "degree", "touch", "stop_after", "speed_bound", "acceleration_bound", "lower_bound",
+    "degree", "touch", "stop_after", "at_start", "at_entry", "speed_bound", "acceleration_bound", "lower_bound",
     "upper_bound", "lipschitz", "resets")}
 _OF_GUARDS["terminal"] = "stop_after"
+
+
+class Stop(Exception):
+    """Ends the run at the event whose reset, or ``time_reset``, returns or raises it.
+
+    ``reason`` is the text that `Run.reason` gives; ``after`` is what the reset would have returned
+    otherwise. Without it state and mode stay as they were before the event.
+    """
+
+    def __init__(self, reason, after=None):
+        if not isinstance(reason, str):
+            raise TypeError(f"Stop: found {reason!r}, expected a text")
+        super().__init__(reason)
+        self.reason = reason
+        self.after = after
+
+
+_ricochet.set_stop_class(Stop)
+
+
+def every(period, phase=0.0, name="every"):
+    """The ticks ``phase + k * period`` of a clock, for ``time_events``; ``name`` is for messages.
+
+    Like `Times`, it has ``next(t)``, the first tick after ``t``, for a system that computes its
+    next time event itself.
+    """
+    return _ricochet.every(number_from(period, "period"), number_from(phase, "phase"), name)
 
 
 class Guard:
@@ -57,6 +83,9 @@ class Guard:
         ``|g|`` at a turning point that counts as a touch.
     stop_after : int
         The run ends with this many events; 0: never.
+    at_start, at_entry : bool
+        The guard fires at the start of a run, and where its mode begins by a change of mode, if it
+        is beyond its surface there, or on it and does not move inside.
     speed_bound, acceleration_bound, lower_bound, upper_bound : functions (t, x) -> float
         With ``lipschitz``, for ``detector="planned"``.
 
@@ -67,8 +96,9 @@ class Guard:
 
     def __init__(self, value=None, *, name=None, direction=-1, reset=None, rest=None, rate=None,
                  enabled=None, in_modes=None, unilateral=False, boolean=False, degree=0,
-                 touch=0.0, stop_after=0, speed_bound=None, acceleration_bound=None,
-                 lower_bound=None, upper_bound=None, lipschitz=1.0, resets=True):
+                 touch=0.0, stop_after=0, at_start=False, at_entry=False, speed_bound=None,
+                 acceleration_bound=None, lower_bound=None, upper_bound=None, lipschitz=1.0,
+                 resets=True):
         if isinstance(in_modes, Iterator):  # read for every run
             in_modes = list(in_modes)
         self._functions = dict(value=value, rate=rate, reset=reset, rest=rest, enabled=enabled,
@@ -76,7 +106,8 @@ class Guard:
                                lower_bound=lower_bound, upper_bound=upper_bound)
         self._numbers = dict(direction=direction, in_modes=in_modes, unilateral=unilateral,
                              boolean=boolean, degree=degree, touch=touch, stop_after=stop_after,
-                             lipschitz=lipschitz, resets=resets)
+                             at_start=at_start, at_entry=at_entry, lipschitz=lipschitz,
+                             resets=resets)
         self.name = name
         self._origin = self  # shared by the guards that ``@name.reset`` and so on make of this one
 
@@ -208,13 +239,37 @@ def _refuse_near_name(cls, name, is_method):
 
 
 def _times(given):
+    if isinstance(given, _ricochet.Times):
+        return given
     try:
-        times = sorted(number_from(t, "time_events") for t in given)
+        times = [number_from(t, "time_events") for t in given]
     except TypeError:
-        raise TypeError(f"time_events: found {given!r}, expected a sequence of times") from None
+        raise TypeError(f"time_events: found {given!r}, expected a sequence of times, or "
+                        "ricochet.every(period)") from None
     if any(t != t for t in times):
         raise ValueError("time_events: found nan, expected times")
-    return times
+    return _ricochet.Times(times)
+
+
+def _asks_state(function, is_moded, args):
+    """Whether next_time_event takes the state: ([mode,] t, x), and not only t."""
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):  # not written in Python
+        return False
+
+    def takes(count):
+        try:
+            signature.bind(*[None] * (count + len(args or ())))
+        except TypeError:
+            return False
+        return True
+    if takes(1):
+        return False
+    mode = "mode, " if is_moded else ""
+    if not takes(2 + is_moded):
+        raise TypeError(f"next_time_event: found {signature}, expected (t) or ({mode}t, x)")
+    return True
 
 
 class System:
@@ -236,10 +291,13 @@ class System:
         The reset of all guards that fired together, instead of their own: ``fired`` is a list of
         their numbers, with ``"time"`` at its end where a time event belongs to it.
     time_events
-        Known times of events; or next_time_event(t), the first after ``t`` or None, and for runs
-        backward in time previous_time_event(t).
+        Known times of events, from the start to the end of a run, both included, and as often as
+        each is listed; or ``ricochet.every(period)``. Or next_time_event(t), the first after ``t``
+        or None, and for runs backward in time previous_time_event(t). Or next_time_event(t, x), of
+        timers in the state, asked at the start and after every set of events: ``t`` if one is due
+        now, a time after it, or None.
     time_reset(t, x) -> x
-        What happens at these times.
+        What happens at these times. This, and every reset, may end the run: `Stop`.
     changes_dimension
         Whether resets may shorten the state without a change of mode.
     formula : int
@@ -413,20 +471,17 @@ class System:
             raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
         self._refuse_arguments(args)
         following, preceding = self.next_time_event, self.previous_time_event
+        times = None
         if self.time_events is not None:
             times = _times(self._read_again("time_events"))
-            if following is None:
-                def following(t, *_):
-                    k = bisect_right(times, t)
-                    return times[k] if k < len(times) else inf
-            if preceding is None:
-                def preceding(t, *_):
-                    k = bisect_left(times, t)
-                    return times[k - 1] if k > 0 else -inf
+            if following is not None or preceding is not None:
+                raise ValueError("time_events: found next_time_event or previous_time_event beside "
+                                 "it, expected one of them")
         if preceding is not None and following is None:
             raise ValueError("previous_time_event: found one without next_time_event, expected "
                              "both")
-        if self.time_reset is not None and following is None:
+        at = following is not None and _asks_state(following, self.modes is not None, args)
+        if self.time_reset is not None and following is None and times is None:
             raise ValueError("time_reset: found one without time events, expected time_events or "
                              "next_time_event beside it")
         guards = self._guard_list()
@@ -440,7 +495,8 @@ class System:
             name=self.name or type(self).__name__, flow=flow, args=args,
             modes=self._mode_list(), guards=guards,
             guard_values=self.guard_values, reset_set=self.reset_set,
-            next_time_event=following, previous_time_event=preceding,
+            time_events=times, next_time_event=None if at else following,
+            next_time_event_at=following if at else None, previous_time_event=preceding,
             time_reset=self.time_reset, changes_dimension=self.changes_dimension))
         if self.parameters is not None:
             source.parameters = {name.replace("_", "-"): float(value)

@@ -70,7 +70,8 @@ class Certified:
         ``"out_of_time"``, ``"out_of_memory"`` or ``"interrupted"``; ``message`` says it as a
         sentence.
     levels : list of SimpleNamespace
-        ``margin, threshold, boxes, seconds, unproved`` of each level that was finished.
+        ``margin, threshold, clears, boxes, seconds, unproved`` of each level that was finished;
+        ``clears`` is the fraction of the domain where the level clears the state.
     estimates : list of SimpleNamespace
         ``boxes, seconds, unproved, error``, of these and of the one that was not.
     counterexample : ndarray or None

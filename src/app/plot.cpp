@@ -14,6 +14,7 @@
 #include <iterator>
 #include <string>
 #include <system_error>
+#include <tuple>
 
 #include "files.hpp"
 #include "input.hpp"
@@ -109,51 +110,80 @@ std::string wrapped_title(std::string_view text)
     return out + single_quoted(text) + ".\"\\n\"";
 }
 
-/// The curve of component i, with its events.
-std::string curves(const Component& component, std::size_t i, std::string_view event,
-                   const PlainRun& run)
+/// A curve in two columns of the files, such as "1:2", with its events and where they jump.
+std::string curves(std::string_view columns, std::string_view title, std::string_view event,
+                   bool has_events, bool jumps)
 {
-    const std::size_t column = i + 2;
-    std::vector<std::string> out{fmt::format("'flights' using 1:{} with lines linestyle 1 title {}",
-                                             column, single_quoted(component.meaning))};
-    if (!run.events.empty() && jumps_in(run, i)) {
-        out.push_back(fmt::format("'jumps' using 1:{} with lines linestyle 12 notitle", column));
+    std::vector<std::string> out{fmt::format("'flights' using {} with lines linestyle 1 title {}",
+                                             columns, single_quoted(title))};
+    if (has_events && jumps) {
+        out.push_back(fmt::format("'jumps' using {} with lines linestyle 12 notitle", columns));
         out.push_back(
-            fmt::format("'jumps' using 1:{} with points linestyle 12 pointsize 0.7 "
+            fmt::format("'jumps' using {} with points linestyle 12 pointsize 0.7 "
                         "title {}",
-                        column, single_quoted(fmt::format("{}: before and after", event))));
-    } else if (!run.events.empty()) {
-        out.push_back(fmt::format("'marks' using 1:{} with points linestyle 12 title {}", column,
+                        columns, single_quoted(fmt::format("{}: before and after", event))));
+    } else if (has_events) {
+        out.push_back(fmt::format("'marks' using {} with points linestyle 12 title {}", columns,
                                   single_quoted(event)));
     }
     return joined(out, ", \\\n     ");
 }
 
+std::string_view event_word(const SystemEntry& system)
+{
+    return system.guards.size() == 1 ? system.guards[0].event : "event";
+}
+
+/// The title of a picture.
+std::string picture_title(const SystemEntry& system, const RunSettings& settings,
+                          const PlainRun& run)
+{
+    return wrapped_title(title(system, settings) +
+                         (run.outcome == Outcome::cancelled ? " (incomplete)" : ""));
+}
+
 std::string script(const SystemEntry& system, const RunSettings& settings, const PlainRun& run)
 {
     const std::size_t panels = system.state.size();
-    const std::string_view event = system.guards.size() == 1 ? system.guards[0].event : "event";
-
     std::string out = fmt::format(
         "set multiplot layout {},1 title {}\n"
-        "set lmargin 11\n"
+        "set lmargin 15\n"
         "set rmargin 3\n"
         "set tmargin 2.5\n"
         "set key outside top right horizontal Left reverse samplen 2.5\n"
         "set offsets graph 0, graph 0, graph 0.06, graph 0.06\n",
-        panels,
-        wrapped_title(title(system, settings) +
-                      (run.outcome == Outcome::cancelled ? " (incomplete)" : "")));
+        panels, picture_title(system, settings, run));
     if (run.t != settings.options.t_start) {
         const auto [left, right] = std::minmax(settings.options.t_start, run.t);
         out += fmt::format("set xrange [{}:{}]\n", left, right);
     }
     for (std::size_t i = 0; i < panels; ++i) {
         if (i + 1 == panels) out += "set xlabel 'time t [s]'\n";
-        out += fmt::format("set ylabel {}\nplot {}\n", single_quoted(axis_label(system.state[i])),
-                           curves(system.state[i], i, event, run));
+        const Component& component = system.state[i];
+        out += fmt::format("set ylabel {}\nplot {}\n", single_quoted(axis_label(component)),
+                           curves(fmt::format("1:{}", i + 2), component.meaning, event_word(system),
+                                  !run.events.empty(), jumps_in(run, i)));
     }
     return out + "unset multiplot\n";
+}
+
+/// One component over another.
+std::string script(const SystemEntry& system, const RunSettings& settings, const PlainRun& run,
+                   const PhasePlane& plane)
+{
+    return fmt::format(
+        "set title {}\n"
+        "set lmargin 15\n"
+        "set rmargin 3\n"
+        "set key outside bottom center horizontal Left reverse samplen 2.5\n"
+        "set offsets graph 0.04, graph 0.04, graph 0.04, graph 0.04\n"
+        "set xlabel {}.\"\\n\"\n"
+        "set ylabel {}\n"
+        "plot {}\n",
+        picture_title(system, settings, run), single_quoted(axis_label(system.state[plane.across])),
+        single_quoted(axis_label(system.state[plane.up])),
+        curves(fmt::format("{}:{}", plane.across + 2, plane.up + 2), "motion", event_word(system),
+               !run.events.empty(), jumps_in(run, plane.across) || jumps_in(run, plane.up)));
 }
 
 std::string content(const fs::path& file)
@@ -208,13 +238,35 @@ void check_plot(const fs::path& file)
     }
 }
 
-void plot(const SystemEntry& system, const RunSettings& settings, const PlainRun& run,
-          const fs::path& file)
+std::optional<PhasePlane> phase_plane(const SystemEntry& system, const SimulateRequest& request)
 {
+    if (!request.phase) return {};
+    if (!request.plot) throw BadInput("--phase is of --plot, which is missing");
+    const std::string_view both = *request.phase;
+    std::vector<std::string_view> names;
+    for (const Component& component : system.state) names.push_back(component.name);
+    const auto place = [&](std::string_view name) {
+        const auto found = std::find(names.begin(), names.end(), name);
+        if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+        throw BadInput(
+            fmt::format("--phase must be two components of the state of {}, as U,V, of "
+                        "{}; got '{}'",
+                        system.name, joined(names, ", "), both));
+    };
+    const std::size_t comma = both.find(',');
+    if (comma == std::string_view::npos) return PhasePlane{place(both), place("")};
+    return PhasePlane{place(both.substr(0, comma)), place(both.substr(comma + 1))};
+}
+
+void plot(const SystemEntry& system, const RunSettings& settings, const PlainRun& run,
+          const fs::path& file, const std::optional<PhasePlane>& plane)
+{
+    const auto [width, height, text] =
+        plane ? std::tuple(900, 900, script(system, settings, run, *plane))
+              : std::tuple(1200, static_cast<int>(100 + 320 * system.state.size()),
+                           script(system, settings, run));
     draw({{"flights", flights(system, run)}, {"jumps", jumps(run)}, {"marks", marks(run)}},
-         plot_head(file, 1200, static_cast<int>(100 + 320 * system.state.size())) +
-             script(system, settings, run),
-         file);
+         plot_head(file, width, height) + text, file);
 }
 
 std::string plot_head(const fs::path& file, int width, int height)

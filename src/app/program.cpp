@@ -181,7 +181,7 @@ void add_run_options(CLI::App& command, RunRequest& run)
     add_text(command, "--gate", run.gate, "NAME",
              "how far a model that clears several steps is trusted: verified (not at all), "
              "certified (where it has been proved right) or calibrated (by name only: events may "
-             "be missed, see inspect)");
+             "be missed, see inspect); network: the detector of that name");
     add_text(command, "--model", run.model, "FILE",
              "network to use, by path or name; default: one that suits");
     add_text(command, "--locator", run.locator, "NAME", "newton (default), bisection or toms748");
@@ -217,6 +217,8 @@ void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
     command.add_flag("--json", request->json, "print JSON");
     add_text(command, "--csv", request->csv, "FILE", "write the sampled trajectory");
     add_text(command, "--plot", request->plot, "FILE", "draw it with gnuplot, as .svg or .png");
+    add_text(command, "--phase", request->phase, "U,V",
+             "draw the component V of the state over U instead of all over time");
     add_text(command, "--kernel", request->kernel, "FILE",
              "of fault: stresses for slip, a .npy file [1/km], in place of the medium's");
     command.footer(
@@ -224,6 +226,7 @@ void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
         "  ricochet simulate bouncing-ball --set restitution=0.8 --plot ball.svg\n"
         "  ricochet simulate bouncing-ball --detector network --step 0.01 --json\n"
         "  ricochet simulate thermostat --mode on --t-end 5\n"
+        "  ricochet simulate stick-slip --plot cycle.svg --phase u,v\n"
         "  ricochet simulate spring-slider --set ratio=0.4 --plot stick-slip.svg\n\n"
         "Why a step is taken to hold no event:\n"
         "  proved    a bound, or the polynomial of the step (bernstein), excludes it\n"

@@ -90,6 +90,8 @@ struct SystemEntry {
     std::string_view name;
     std::string_view description;  ///< one sentence
     std::string_view source{};     ///< of the problem; empty: it is ricochet's own
+    /// Equations of systems with friction, a line each, in the names of parameters and state.
+    std::vector<std::string_view> equations{};
     std::vector<Parameter> parameters;
     std::vector<Component> state;
     std::vector<GuardLabel> guards{};

@@ -60,6 +60,8 @@ Json json(const Statistics& s)
             {"disabled", s.disabled},
             {"unmet_conditions", s.unmet_conditions},
             {"ineffective_resets", s.ineffective_resets},
+            {"either_relays", s.either_relays},
+            {"armed_beyond", s.armed_beyond},
             {"evidence",
              {{"proved", s.evidence.proved},
               {"checked", s.evidence.checked},
@@ -218,7 +220,10 @@ std::string to_json(const SystemEntry& system, const RunSettings& settings, cons
     out["state"] = run.x;
     if (!system.modes.empty()) out["mode"] = system.modes.at(run.mode);
     if (run.guard != no_guard) out["ended_by"] = system.guards.at(run.guard).name;
-    if (run.other_guard != no_guard) out["conflicts_with"] = opponent(system, run);
+    if (run.other_guard != no_guard) {
+        const bool in_turn = run.outcome == Outcome::zeno;
+        out[in_turn ? "in_turn_with" : "conflicts_with"] = opponent(system, run);
+    }
     out["events"] = std::move(events);
     out["statistics"] = json(run.statistics);
     add_set_valued(out, settings, timed);
@@ -258,6 +263,10 @@ std::string to_text(const SystemEntry& system, const RunSettings& settings, cons
                    ? fmt::format("  incomplete: {}\n", Interrupts::cause())
                    : fmt::format("  {}{}\n", guard, describe(run.outcome));
     }
+    std::vector<std::string> names;
+    for (const GuardLabel& guard : system.guards) names.emplace_back(guard.name);
+    const std::string more = describe(s, names);
+    if (!more.empty()) out += fmt::format("  {}\n", more);
     out +=
         fmt::format("{} event{}, {} steps ({} rejected), {} flow calls, {} guard calls", s.events,
                     s.events == 1 ? "" : "s", s.steps, s.rejected, s.flow_calls, s.guard_calls);

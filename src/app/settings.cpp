@@ -183,8 +183,9 @@ void choose_detector(const SystemEntry& system, const RunRequest& request, RunSe
             throw BadInput("--gate is a detector, too; expected one of the two, got both");
         }
         settings.detector = named("gate", detectors, *request.gate);
-        if (!is_gate(settings.detector)) {
-            throw unknown("gate", *request.gate, {"verified", "certified", "calibrated"});
+        if (!is_gate(settings.detector) && settings.detector != DetectorKind::network) {
+            throw unknown("gate", *request.gate,
+                          {"verified", "certified", "calibrated", "network"});
         }
     } else if (request.detector) {
         settings.detector = named("detector", detectors, *request.detector);

@@ -58,9 +58,9 @@ struct RunSettings {
     bool fixed_step = false;  ///< else error control
     DetectorKind detector = DetectorKind::extremum;
     LocatorKind locator = LocatorKind::newton;
-    std::optional<Network> network{};  ///< of the detectors `network` and `verified`
-    std::optional<Model> gate{};       ///< of `certified` and `calibrated`, and of `verified`
-    std::filesystem::path model{};     ///< the file of either
+    std::optional<BareNetwork> network{};  ///< of the detectors `network` and `verified`
+    std::optional<Model> gate{};           ///< of `certified` and `calibrated`, and of `verified`
+    std::filesystem::path model{};         ///< the file of either
     std::optional<SetValuedSettings> set_valued{};
 };
 

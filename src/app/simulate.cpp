@@ -50,6 +50,7 @@ int simulate(const SimulateRequest& request)
     Claims claims;
     if (!settings.model.empty()) claims.reads("the model", settings.model);
     claim_results(claims, request);
+    const std::optional<PhasePlane> plane = phase_plane(system, request);
     if (request.samples || request.csv || request.plot) {
         settings.options.sample_times = evenly(settings.options.t_start, settings.options.t_end,
                                                request.samples.value_or(default_samples));
@@ -69,7 +70,7 @@ int simulate(const SimulateRequest& request)
                  if (request.csv) write_file(*request.csv, to_csv(system, timed.run));
              },
              [&] {
-                 if (request.plot) plot(system, settings, timed.run, *request.plot);
+                 if (request.plot) plot(system, settings, timed.run, *request.plot, plane);
              }});
     const Outcome outcome = timed.run.outcome;
     if (outcome == Outcome::cancelled) return ended_early(fmt::format("at t = {} s", timed.run.t));

@@ -16,6 +16,7 @@ struct SimulateRequest {
     std::optional<std::size_t> samples{};
     bool json = false;
     std::optional<std::filesystem::path> csv{}, plot{};
+    std::optional<std::string> phase{};             ///< two components, for `plot`: "u,v"
     std::optional<std::filesystem::path> kernel{};  ///< for the system fault
 };
 

@@ -41,16 +41,18 @@ Json json(const SystemEntry& system)
     }
     Json guards = Json::array();
     for (const GuardLabel& guard : system.guards) guards.push_back(guard.name);
-    return {{"name", system.name},     {"description", system.description},
-            {"source", system.source}, {"parameters", parameters},
-            {"state", state},          {"guards", guards},
-            {"modes", system.modes},   {"t_start", system.t_start},
-            {"t_end", system.t_end},   {"taylor", system.series}};
+    return {{"name", system.name},       {"description", system.description},
+            {"source", system.source},   {"equations", system.equations},
+            {"parameters", parameters},  {"state", state},
+            {"guards", guards},          {"modes", system.modes},
+            {"t_start", system.t_start}, {"t_end", system.t_end},
+            {"taylor", system.series}};
 }
 
 std::string text(const SystemEntry& system)
 {
     std::string out = fmt::format("{}\n    {}\n", system.name, system.description);
+    for (const std::string_view line : system.equations) out += fmt::format("        {}\n", line);
     for (const Parameter& parameter : system.parameters) {
         const std::string_view unit = parameter.unit == "1" ? "" : parameter.unit;
         out += fmt::format("    {:<15} {:>6} {:<5} {:<12} {}\n", parameter.name, parameter.initial,
@@ -85,6 +87,9 @@ std::string known_solution(const SystemEntry& system)
 std::string markdown(const SystemEntry& system)
 {
     std::string out = fmt::format("## {}\n\n{}\n\n", system.name, system.description);
+    if (!system.equations.empty()) {
+        out += fmt::format("```text\n{}\n```\n\n", joined(system.equations, "\n"));
+    }
     std::vector<std::string> state;
     for (const Component& x : system.state) {
         state.push_back(fmt::format("{} [{}], {}", x.name, x.unit, x.meaning));

@@ -81,7 +81,7 @@ protected:
           backward_(options.t_end < options.t_start),
           step_(system_, *setup.kernel, x0, options),
           bank_(system_, BankRules::of(setup.detector, system_), backward_),
-          search_(x0, bank_.size(), finders_, resolution_),
+          search_(system_, x0, bank_.size(), finders_, options_),
           resets_(x0),
           left_rate_(x0),
           left_start_(x0),
@@ -114,8 +114,12 @@ protected:
 
     void refuse_bad_guards();
 
-    /// Puts the guards that fire at the start into the fired set.
-    void arm_at_start();
+    /// Whether something besides the end time may end the run. Of resets that is not known.
+    [[nodiscard]] bool may_end() const noexcept;
+
+    /// Puts the guards that fire at the start into the fired set; if the run `begins` there, also
+    /// those with `at_start`.
+    void arm_at_start(bool begins);
 
     /// Whether guard i, not in the fired set, is on its other side at the set by no more than
     /// rounding.
@@ -124,7 +128,7 @@ protected:
     /// Change of guard i at the start of the step that may come from rounding of the time and of
     /// the state, by 8 units in the last place of each component.
     [[nodiscard]] double rounding_of(std::size_t i);
-    [[nodiscard]] double rounding_of(std::size_t i, double t, const X& x);
+    [[nodiscard]] double rounding_of(std::size_t i, Mode mode, double t, const X& x);
 
     [[nodiscard]] std::uint64_t& calls() noexcept { return run_.statistics.guard_calls; }
 
@@ -140,6 +144,7 @@ protected:
     {
         run_.guard = run_.other_guard = no_guard;
         run_.wrong_bound.reset();
+        run_.reason.clear();
     }
 
     void add_evidence(Evidence evidence, std::uint64_t steps) noexcept;
@@ -156,8 +161,27 @@ protected:
 
     // --- time events ---
 
-    /// Finds the next time event. One that does not lie ahead would be lost, with all after it.
-    void find_time_event(bool at_start = false);
+    /// Reason for which a time event is asked for.
+    enum class After : std::uint8_t { start, restart, set, time_event };
+
+    /// Finds the next time event at the start of the step. One of a timer in the state, or of a
+    /// list, may be due there; any other that does not lie ahead would be lost, with all after it.
+    void find_time_event(After what);
+
+    /// Asks a timer in the state, which a set or a rest may have started or cancelled.
+    void ask_timer()
+    {
+        if (system_->next_time_event_at && !ended_) find_time_event(After::set);
+    }
+
+    /// Whether the state, or the list, has a time event at the start of the step.
+    [[nodiscard]] bool is_due_here(After what);
+
+    /// Applies a time event that is due at the start of the step, after others of this instant.
+    [[nodiscard]] bool apply_due_time_event();
+
+    /// Whether the timers in the state have shown to be without an end at this instant.
+    [[nodiscard]] bool timer_is_endless();
 
     /// Applies a time event at the start of the step; `settle` deals with its consequences.
     void apply_time_event();
@@ -182,12 +206,13 @@ protected:
             return bank_.suspicious(step_.h());
         if (step_.is_hosts_cubic() && bank_.clear_as_cubics(step_.h())) return false;
         check_inside();
-        return is_suspicious(error_controlled_ && hardly_moves());
+        const bool signs = bank_.has_signs() && search_.checks_signs_closely(step_.h());
+        return is_suspicious(signs || (error_controlled_ && hardly_moves()));
     }
 
-    /// The same, after an evaluation inside the step if there is one; guards are evaluated at
-    /// several more places if the state hardly moves.
-    [[nodiscard]] bool is_suspicious(bool hardly_moves);
+    /// The same, after an evaluation inside the step if there is one. `everywhere`: guards are
+    /// evaluated at several more places, as where the state hardly moves.
+    [[nodiscard]] bool is_suspicious(bool everywhere);
 
     /// Guards with power series need no rates until a search asks for them.
     void sample_end()
@@ -209,6 +234,11 @@ protected:
     [[nodiscard]] Evidence evidence_of_clear() const noexcept
     {
         return bank_.on_series() ? Evidence::proved : finders_.detector.evidence;
+    }
+
+    [[nodiscard]] Evidence evidence_of_quiet() const noexcept
+    {
+        return on_series_ ? Evidence::proved : finders_.detector.evidence;
     }
 
     void pass_on_clear() noexcept
@@ -255,6 +285,13 @@ protected:
         run_.statistics.unresolved_steps += search_.unresolved();
     }
 
+    /// The same for a step that holds no event.
+    void count_covered() noexcept
+    {
+        run_.statistics.refined_steps += search_.cover().refined();
+        run_.statistics.unresolved_steps += search_.cover().unresolved();
+    }
+
     [[gnu::noinline]] void end_plateaus()
     {
         for (std::size_t i = 0; i < bank_.size(); ++i) {
@@ -264,6 +301,10 @@ protected:
 
     /// Whether an event of guard i, which is about to fire at the start of the step, counts.
     [[nodiscard]] bool counts_here(std::size_t i);
+    [[nodiscard]] bool is_enabled_here(std::size_t i) const
+    {
+        return system_.enabled_at(i, step_.mode(), step_.time(0), step_.x0());
+    }
 
     /// Removes guards from the fired set whose crossing is no event: those that `enabled`
     /// rejects, and repeats of an event inside its own window.
@@ -376,8 +417,13 @@ protected:
         planner_->begin(step_, bank_);
     }
 
-    /// Whether one of the guards in doubt needs a search in the current step.
+    /// Whether one of the guards in doubt needs a search in the current step. Those that their
+    /// bounds clear on a division of the step are not in doubt any more.
     [[nodiscard]] bool judges_suspicious();
+
+    /// Whether declared bounds show an event inside the current step, where every guard is
+    /// examined.
+    [[nodiscard]] bool bounds_show_event();
 
     // --- applying ---
 
@@ -393,6 +439,7 @@ protected:
     /// Notes what rounding has taken from the components that the resets of the set leave alone,
     /// bit for bit: it is still due after the event.
     void note_left_alone(bool located);
+    [[gnu::noinline]] void note_lost(const X& before, const X& after, bool located);
 
     void place_set(const Instant& at) noexcept
     {
@@ -417,6 +464,9 @@ protected:
         return search_.fired().empty() ? no_guard : search_.fired()[0];
     }
 
+    /// Notes that a reset of the set has ended the run.
+    void note_stop();
+
     /// Whether the resets have left a state to continue from; else the run has ended.
     [[nodiscard]] bool goes_on();
 
@@ -440,17 +490,26 @@ protected:
     /// instant, or a fired guard has come to rest, and `settle` is due again.
     [[nodiscard]] bool settle();
 
-    /// Settles everything that happens at one instant, and evaluates the flow there.
-    void settle_all()
+    void begin_instant() noexcept
     {
         level_ = 0;
         ++instant_;
+    }
+
+    /// Settles everything that happens at one instant, and evaluates the flow there.
+    void settle_all()
+    {
+        begin_instant();
         while (settle()) {
         }
     }
 
-    /// Fires the guards that were carried across their surfaces.
-    [[nodiscard]] bool apply_next_set();
+    /// Fires the guards that were carried across their surfaces, at the start of a run together
+    /// with a time event that is due there.
+    [[nodiscard]] bool apply_next_set(bool on_time = false);
+
+    /// Whether set, mode and state repeat those of an earlier level of this instant.
+    [[nodiscard]] bool repeats_level(std::span<const std::size_t> fired);
 
     /// The guard that shows the sets at this instant to be without an end: the set, mode and state
     /// repeat, or it fires for the thousandth time; `no_guard` if there is none.
@@ -459,6 +518,18 @@ protected:
     /// Whether the events of a fired guard accumulate here, so that it comes to rest or the run
     /// ends.
     [[nodiscard]] bool rest_fired();
+
+    /// Whether the fired guards prolong a row of events with excursions that are lost in rounding,
+    /// by which a cycle of guards accumulates.
+    [[nodiscard]] bool prolongs_row();
+    /// Records the excursion of guard i that has just ended, `soon` after the last acting instant.
+    [[nodiscard]] bool falls(std::size_t i, bool soon);
+
+    /// Uncertainty [s] of a limit that comes from the rounding of the guards of the cycle: those
+    /// with an event in the last two rounds of that length [s].
+    [[nodiscard]] double error_by_rounding(double round);
+    /// Another guard of the cycle in which guard i accumulates: the last one before it.
+    [[nodiscard]] std::size_t other_of_cycle(std::size_t i);
 
     /// Stores the rate at which guard i leaves its surface after its reset. True if the guard will
     /// not rise above its rounding any more.
@@ -489,13 +560,49 @@ protected:
 
     void enable_guards();
 
+    /// Whether the event of a guard armed on `side` cannot come before it has returned: it is
+    /// beyond its surface.
+    [[nodiscard]] static constexpr bool is_beyond(Side side, Crossing crossing) noexcept
+    {
+        return side != Side::plateau && !counts(side, crossing);
+    }
+
+    /// Fires guard i, just armed at the start, if it asks for it there; else counts it if it is
+    /// beyond its surface.
+    void fire_at_start(std::size_t i);
+
+    /// Fires guard i because its condition holds, not because of a crossing.
+    void fire_by_condition(std::size_t i);
+
+    /// Whether guard i, just armed in a mode that has been entered, asks to fire there.
+    [[nodiscard]] bool fires_at_entry(std::size_t i) noexcept;
+
+    void count_armed_beyond(std::size_t i) noexcept
+    {
+        ++run_.statistics.armed_beyond;
+        bank_[i].armed_beyond = true;
+    }
+
+    /// Lists the guards that were armed beyond their surfaces.
+    void list_armed_beyond()
+    {
+        run_.armed_beyond.clear();
+        if (run_.statistics.armed_beyond == 0) return;
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            if (std::as_const(bank_)[i].armed_beyond) run_.armed_beyond.push_back(i);
+        }
+    }
+
     /// Arms every guard at the start of a flight. Guards that have fired count as
     /// being on their surface up to the error of their location. Guards that the
     /// resets have carried across their surface become the new fired set.
     void arm_all();
 
     /// Returns false if the run has ended.
-    [[nodiscard]] bool arm_one(std::size_t i, double widest);
+    [[nodiscard]] bool arm_one(std::size_t i, double widest, bool opens);
+    /// Whether a time event has ended the veto of guard i, which lies on its surface: a guard that
+    /// was passed is armed beyond.
+    [[nodiscard]] bool ends_veto(std::size_t i);
 
     /// Side from which a departure counts; `else_side` if a departure from either side does.
     [[nodiscard]] static constexpr Side side_left_by(Crossing crossing, Side else_side) noexcept
@@ -557,7 +664,7 @@ protected:
     {
         if (!options_.record_events) return;
         if (setup_.add_event) return setup_.add_event(setup_.events, event);
-        if (run_.events.empty()) run_.events.reserve(16);  // most runs have no more events
+        make_room(run_.events);
         run_.events.push_back(std::move(event));
     }
 
@@ -565,6 +672,8 @@ protected:
 
     void record_time_event(double t);
 
+    /// Bracket [s] of a guard whose event is at t.
+    [[nodiscard]] Bracket bracket_of(const Location& where, double t) const noexcept;
     /// Records a fired guard that was found inside the step or carried across at its start.
     void record_crossing(std::size_t i, double t, bool located);
 
@@ -620,7 +729,14 @@ protected:
     double time_event_ = std::numeric_limits<double>::infinity();
     bool time_event_due_ = false;
     double passed_ = std::numeric_limits<double>::quiet_NaN();  ///< the last time event
+    bool due_here_ = false;            ///< a time event is due at the start of the step
+    bool timer_idles_ = false;         ///< the last time event of this instant changed nothing
+    double listed_at_ = stale;         ///< [s] where time events that are listed were counted,
+    std::size_t listed_left_ = 0;      ///< and how many of them are still to come
+    std::uint64_t timer_instant_ = 0;  ///< the last at which a timer was due, and how often then
+    std::uint32_t timer_at_once_ = 0;
     bool ended_ = false;
+    bool endless_ = false;  ///< the end of the options is infinite
     bool resting_ = false;
     bool stops_ = false;
     std::size_t stopper_ = no_guard;  ///< the guard of the set that ends the run
@@ -633,6 +749,7 @@ protected:
     Mode mode_before_ = 0;
     boost::container::small_vector<std::pair<std::size_t, double>, 8> left_alone_;
     bool changed_mode_ = false;  ///< by the resets of the current set
+    bool enters_mode_ = false;   ///< by them, or by the rest after them
     X left_rate_;                ///< flow at x⁻, of the mode that is left
     X left_start_;               ///< the same at the start of the step
     double left_after_ = 0;      ///< [s] later; 0: it is not known

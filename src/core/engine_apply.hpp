@@ -35,7 +35,12 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
         step_.restart(at, search_.before(), step_.mode());
         return;
     }
-    changed_mode_ = resets_.mode() != step_.mode();
+    if (resets_.stops()) note_stop();
+    changed_mode_ = enters_mode_ = resets_.mode() != step_.mode();
+    if (system_->next_time_event_at) {
+        const bool changes = changed_mode_ || !same_state(resets_.after(), search_.before());
+        timer_idles_ = !changes && (on_time || (timer_idles_ && !located));
+    }
     leaves_phase_ = true;
     step_.restart(at, resets_.after(), resets_.mode());
     for (const auto& [component, lost] : left_alone_) step_.set_remainder(component, lost);
@@ -52,6 +57,17 @@ inline void EventEngine<X, single>::note_left_alone(bool located)
     const X& before = search_.before();
     const X& after = resets_.after();
     if (before.size() != after.size() || before.size() > 64) return;
+    bool any = false;
+    for_each_component(
+        after, [&](auto i) __attribute__((always_inline)) {
+            any = any | ((after[i] == before[i]) & (after[i] != 0));
+        });
+    if (any) note_lost(before, after, located);
+}
+
+template <class X, bool single>
+void EventEngine<X, single>::note_lost(const X& before, const X& after, bool located)
+{
     for (std::size_t c = 0; c < static_cast<std::size_t>(before.size()); ++c) {
         const auto i = static_cast<decltype(before.size())>(c);
         // A zero may have been set.
@@ -72,8 +88,8 @@ inline void EventEngine<X, single>::find_band(std::size_t i, double t)
         record.band = 0;
         return;
     }
-    const double residue = 2 * std::fabs(where.slope) * where.error;
-    record.estimated = system_->bounded && !record.info.boolean && std::isfinite(residue) &&
+    const double residue = system_->bounded ? 2 * std::fabs(where.slope) * where.error : infinity;
+    record.estimated = std::isfinite(residue) && !record.info.boolean &&
                        search_.at() == where.root && !search_.late();
     const double g = search_.value_at_set(i);
     record.band = record.estimated ? std::max(residue, bank_.touch(i, step_.h()))
@@ -99,18 +115,79 @@ inline bool EventEngine<X, single>::goes_on()
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::find_time_event(bool at_start)
+inline void EventEngine<X, single>::note_stop()
 {
-    if (!timed_) return;
+    stops_ = true;
+    stopper_ = resets_.stopper() == time_event_reset ? no_guard : resets_.stopper();
+    run_.reason = resets_.reason();
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::find_time_event(After what)
+{
     const double t = step_.start().value;
-    if (!backward_) {
+    due_here_ = false;
+    if (backward_) {
+        if (system_->previous_time_event) {
+            time_event_ = system_->previous_time_event(system_.door(), t);
+        }
+    } else if (system_->next_time_event_at) {
+        time_event_ = system_->next_time_event_at(system_.door(), step_.mode(), t, step_.x0());
+    } else {
         time_event_ = system_->next_time_event(system_.door(), t);
-    } else if (system_->previous_time_event) {
-        time_event_ = system_->previous_time_event(system_.door(), t);
+    }
+    if (is_due_here(what)) {
+        due_here_ = true;
+        time_event_ = t;
+        return;
     }
     if (step_.until(time_event_) > 0) return;
-    if (at_start) throw_time_event_not_ahead(who_, backward_, t, time_event_);
+    if (what == After::start || what == After::restart) {
+        throw_time_event_not_ahead(who_, backward_, system_->next_time_event_at, t, time_event_);
+    }
     end(Outcome::time_event_not_ahead);
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::is_due_here(After what)
+{
+    const double t = step_.start().value;
+    const bool is_past = what == After::start && options_.continues;
+    if (system_->time_event_count) {
+        if (listed_at_ != t) {
+            listed_at_ = t;
+            const bool none = is_past || what == After::restart;
+            listed_left_ = none ? 0 : system_->time_event_count(system_.door(), t);
+        }
+        if (what == After::time_event && listed_left_ > 0) --listed_left_;
+        return listed_left_ > 0;
+    }
+    if (backward_ || !system_->next_time_event_at || is_past || timer_idles_) return false;
+    const double ahead = step_.until(time_event_);
+    return time_event_ == t || (ahead <= 0 && -ahead <= resolution_.window(t));
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::apply_due_time_event()
+{
+    if (system_->time_event_count) {  // each entry of a list happens, whatever it changes
+        begin_instant();
+    } else if (timer_is_endless()) {
+        end(Outcome::endless_cascade);
+        return false;
+    }
+    search_.begin(step_.x0());
+    search_.stay_at_start();
+    place_set(step_.instant(0, 0));
+    apply_time_event();
+    return !ended_;
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::timer_is_endless()
+{
+    timer_at_once_ = std::exchange(timer_instant_, instant_) == instant_ ? timer_at_once_ + 1 : 1;
+    return timer_at_once_ == most_at_once || repeats_level({});
 }
 
 template <class X, bool single>

@@ -1,6 +1,8 @@
 // Search for the first set of events in the current step.
 #pragma once
 
+#include <algorithm>
+
 #include "core/engine.hpp"
 
 namespace ricochet::detail {
@@ -21,18 +23,20 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
     }
     if (bank_.size() == 0) return false;
     sample_end();
-    if (any_suspicious() || has_ties()) return true;
+    const bool dips = !single && defers_ && bounds_show_event();
+    if (any_suspicious() || dips || has_ties()) return true;
+    if (!single && defers_) count_covered();
     if (asked_ && !cleared) ++run_.statistics.false_alarms;
     pass_on_clear();
     return false;
 }
 
 template <class X, bool single>
-inline bool EventEngine<X, single>::is_suspicious(bool hardly_moves)
+inline bool EventEngine<X, single>::is_suspicious(bool everywhere)
 {
     if (!bank_.checked()) return bank_.suspicious(step_.h());
-    const bool stands = hardly_moves && step_.stands();
-    if (hardly_moves && !(stands && bank_.are_cubics_of_time())) {
+    const bool stands = everywhere && step_.stands();
+    if (everywhere && !(stands && bank_.are_cubics_of_time())) {
         X& x = search_.space(step_.x0());
         if (stands) assign(x, step_.x0());
         for (const double u : CubicCheck::places) {
@@ -178,7 +182,7 @@ inline void EventEngine<X, single>::dismiss_members()
 template <class X, bool single>
 inline bool EventEngine<X, single>::changes_nothing()
 {
-    if (cuts_at_all_) return false;
+    if (cuts_at_all_ || resets_.stops()) return false;
     if (resets_.mode() != step_.mode() || resets_.conflict().first != no_guard) return false;
     for (const std::size_t i : search_.fired()) {
         if (bank_[i].info.unilateral || ends_run(i)) return false;
@@ -209,10 +213,12 @@ bool EventEngine<X, single>::acts_beyond()
     }
     X& x = resets_.scratch();
     const double t = search_.go_beyond(step_, bank_, i, x, calls());
-    if (!(t == t)) return false;
-    if (!resets_.ask_again(system_, i, step_.mode(), t, x, search_.before())) return false;
-    --count;
-    return true;
+    if (t == t && resets_.ask_again(system_, i, step_.mode(), t, x, search_.before())) {
+        --count;
+        return true;
+    }
+    run_.statistics.declined_guard = i;
+    return false;
 }
 
 template <class X, bool single>
@@ -236,13 +242,43 @@ inline void EventEngine<X, single>::go_on_past_members()
 }
 
 template <class X, bool single>
+inline bool EventEngine<X, single>::bounds_show_event()
+{
+    search_.cover().begin();
+    bank_.forget_dips();
+    bool any = false;
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        const GuardRecord& record = std::as_const(bank_)[i];
+        if (!record.enabled || record.deferred) continue;
+        const bool dips = search_.bounds_show_event(step_, bank_, i, calls());
+        bank_.note_dip(i, dips);
+        any = any || dips;
+    }
+    return any;
+}
+
+template <class X, bool single>
 inline bool EventEngine<X, single>::judges_suspicious()
 {
+    search_.cover().begin();
+    bank_.forget_dips();
+    planner_->close_inside(step_, bank_, search_, run_.statistics);
+    if (planner_->judged().empty()) {
+        count_covered();
+        count_deferred(1);
+        return false;
+    }
     planner_->wake(step_, bank_, run_.statistics, last_h_);
+    for (const std::size_t i : planner_->judged()) {
+        const bool open = bank_.starts_at_event(i, step_) || std::as_const(bank_)[i].info.boolean;
+        if (!open) continue;
+        bank_.note_dip(i, search_.bounds_show_event(step_, bank_, i, calls()));
+    }
     for (const std::size_t i : planner_->judged()) {
         if (bank_.leaves_plateau(i) || bank_.suspicious(i, step_.h())) return true;
     }
     if (has_ties()) return true;
+    count_covered();
     run_.statistics.evidence.add(finders_.detector.evidence);
     for (const std::size_t i : planner_->judged()) bank_.leave_plateau(i);
     return false;

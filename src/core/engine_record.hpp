@@ -70,7 +70,7 @@ inline bool EventEngine<X, single>::is_rounding_at_set(std::size_t i, const Guar
     const double moves = std::fabs(at.rate) * std::fabs(step_.time(at.s));
     if (bank_[i].acting || has_left(bank_[i].side, at.value)) return false;
     if (!(size <= 0x1p-20 * std::max(bank_.scale(i, step_.h()), moves))) return false;
-    return size <= rounding_of(i, step_.time(at.s), search_.before());
+    return size <= rounding_of(i, step_.mode(), step_.time(at.s), search_.before());
 }
 
 template <class X, bool single>
@@ -111,6 +111,16 @@ inline void EventEngine<X, single>::record_time_event(double t)
 }
 
 template <class X, bool single>
+inline Bracket EventEngine<X, single>::bracket_of(const Location& where, double t) const noexcept
+{
+    // The condition of an event may hold only some roundings beyond the bracket of its guard.
+    const double lo = step_.time(where.lo), hi = step_.time(where.hi);
+    const bool is_beyond = backward_ ? t < hi : t > hi;
+    const double roundings = 16 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+    return {lo, is_beyond && std::fabs(t - hi) <= roundings ? t : hi};
+}
+
+template <class X, bool single>
 inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, bool located)
 {
     const bool stops = stops_ && i != first_fired();
@@ -120,7 +130,8 @@ inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, boo
     const Side side = bank_[i].side;
     count_event(i, t, located ? side : opposite(side));
     if (!options_.record_events) return;
-    const Location where = located ? search_.where(i) : Location{};
+    static constexpr Location here{};
+    const Location& where = located ? search_.where(i) : here;
     record({.t = t,
             .kind = kind_of(where),
             .guard = i,
@@ -128,7 +139,7 @@ inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, boo
             .mode_after = resets_.mode(),
             .before = search_.before(),
             .after = resets_.after(),
-            .bracket = {step_.time(where.lo), step_.time(where.hi)},
+            .bracket = bracket_of(where, t),
             .slope = where.slope,
             .error = where.error,
             .late = located && search_.late()});

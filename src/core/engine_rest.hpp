@@ -9,20 +9,75 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::rest_fired()
 {
     bool rested = false;
+    const bool in_row = bank_.keeps_rows() && prolongs_row();
     for (const std::size_t i : search_.fired()) {
         ShrinkingIntervals& intervals = bank_[i].intervals;
         const bool again = std::exchange(bank_[i].again, false);
         const bool stalls = intervals.stalls(step_.start(), h_next_) || again;
         const double tolerance = resolution_.tolerance(step_.start().value);
         const bool resetting = resets_any_ && bank_[i].info.resets;
-        if (resetting && located_) intervals.blame(search_.where(i).error);
+        if (resetting && located_) {
+            const Location& where = search_.where(i);
+            intervals.blame(std::isfinite(where.error) ? where.error : where.hi - where.lo);
+        }
         if (stalls || (resetting && (fades(i) || intervals.accumulate(tolerance)))) {
             come_to_rest(i, stalls ? 0 : intervals.remainder(), intervals.error());
+            rested = true;
+        } else if (in_row && bank_.row().ends_with(bank_[i].excursions)) {
+            come_to_rest(i, 0, intervals.error());
             rested = true;
         }
     }
     if (rested && !ended_) pending_ = resting_ ? Pending::hold : Pending::arm;
     return rested;
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::prolongs_row()
+{
+    if (!located_) return false;  // at the same instant as the set before
+    LostRow& row = bank_.row();
+    const bool soon = row.follows_soon(step_.start());
+    bool falls = soon && !on_time_ && !search_.fired().empty();
+    for (const std::size_t i : search_.fired()) falls &= this->falls(i, soon);
+    if (!falls) {
+        row.clear();
+        return false;
+    }
+    for (const std::size_t i : search_.fired()) row.add(bank_[i].excursions);
+    return true;
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::falls(std::size_t i, bool soon)
+{
+    GuardRecord& record = bank_[i];
+    if (record.info.boolean || !resets_any_ || !record.info.resets) return false;
+    Excursions& excursions = record.excursions;
+    const double t = step_.start().value;
+    const X& x = search_.before();
+    const double interval = bank_.row().interval();
+    double slope = search_.where(i).slope;
+    const auto size = [&] {
+        return std::fmax(std::fabs(bank_.armed_value(i)), std::fabs(slope) * interval / 4);
+    };
+    if (!soon) {
+        excursions.pass(size());
+        return false;
+    }
+    if (excursions.wants_rounding(size())) {
+        excursions.set_rounding(rounding_of(i, mode_before_, t, x));
+    }
+    // A difference over a part of a step says nothing about a slow guard.
+    const bool resolved = size() > 0x1p20 * excursions.rounding();
+    if (!resolved && !system_->rated && system_->flow) {
+        X rate = x;
+        step_.flow_in(mode_before_, t, x, rate);
+        slope = bank_.view(i, mode_before_, calls()).rate(t, x, rate, 1e5 * low_part * interval);
+    }
+    const bool falls = excursions.fall(size());
+    excursions.end(t, slope);
+    return falls;
 }
 
 template <class X, bool single>
@@ -84,6 +139,34 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
 }
 
 template <class X, bool single>
+std::size_t EventEngine<X, single>::other_of_cycle(std::size_t i)
+{
+    std::size_t other = no_guard;
+    if (!bank_.keeps_rows()) return other;
+    double last = 2 * bank_[i].intervals.interval();
+    for (std::size_t k = 0; k < bank_.size(); ++k) {
+        const double ago =
+            std::fabs(step_.start().value - std::as_const(bank_)[k].excursions.end());
+        if (k == i || !(ago <= last)) continue;
+        last = ago;
+        other = k;
+    }
+    return other;
+}
+
+template <class X, bool single>
+double EventEngine<X, single>::error_by_rounding(double round)
+{
+    double error = 0;
+    const double t = step_.start().value;
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        const Excursions& excursions = std::as_const(bank_)[i].excursions;
+        if (std::fabs(t - excursions.end()) <= 2 * round) error += excursions.error(t);
+    }
+    return error;
+}
+
+template <class X, bool single>
 inline double EventEngine<X, single>::distance_put_back(std::size_t i)
 {
     const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
@@ -93,7 +176,11 @@ inline double EventEngine<X, single>::distance_put_back(std::size_t i)
 template <class X, bool single>
 inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, double error)
 {
-    if (!system_->rest || bank_[i].intervals.outlast_rest()) return end(Outcome::zeno, i);
+    if (!system_->rest || bank_[i].intervals.outlast_rest()) {
+        end(Outcome::zeno, i);
+        run_.other_guard = other_of_cycle(i);
+        return;
+    }
     if (resting_ || ended_) return;
     const X before = step_.x0();
     const Mode mode = step_.mode();
@@ -105,6 +192,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
         ahead > 4 * std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value)) {
         error += std::exchange(ahead, 0);
     }
+    if (bank_.keeps_rows()) error += error_by_rounding(bank_[i].intervals.interval());
     const double t = step_.time(ahead);
     X after = before;
     const Mode mode_after = system_->rest(system_.door(), i, mode, t, after);
@@ -128,12 +216,14 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
         return end(Outcome::non_finite, i);
     }
     leaves_phase_ = false;
+    enters_mode_ = mode_after != mode;
     step_.restart(ahead, 0, after, mode_after);
     start_beyond_time_event();
     for (const std::size_t k : search_.fired()) {
         bank_[k].rated_over = stale;
     }
     bank_[i].intervals.come_to_rest();
+    bank_.row().clear();
     bank_[i].band = 0;
     resting_ = bank_.size() == 1 && !system_->moded;
     if (resting_ && !stays_on_surface(i)) end(Outcome::zeno, i);
@@ -144,7 +234,8 @@ inline bool EventEngine<X, single>::stays_on_surface(std::size_t i)
 {
     const auto guard = bank_.view(i, step_.mode(), calls());
     const double left = step_.until(options_.t_end);
-    const double span = std::isfinite(left) ? left : 1e6 * h_next_;  // a host declares no end
+    const bool ends = std::isfinite(left) && !endless_;  // a host declares no end
+    const double span = ends ? left : 1e6 * h_next_;
     const double rounding = rounding_of(i);
     const double g = guard.value(step_.time(0), step_.x0());
     for (const double part : {0.001, 0.0381966, 0.381966, 1.0}) {

@@ -10,26 +10,37 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline bool EventEngine<X, single>::settle()
 {
-    switch (std::exchange(pending_, Pending::nothing)) {
+    const Pending due = std::exchange(pending_, Pending::nothing);
+    const bool at_start = due == Pending::nothing;
+    switch (due) {
         case Pending::nothing: break;
-        case Pending::hold: return false;
+        case Pending::hold: ask_timer(); break;
         case Pending::settle:
             if (guarded_ && !resting_ && !rest_fired()) arm_all();
-            if (on_time_ && !ended_) find_time_event();
+            if (on_time_ && !ended_) {
+                find_time_event(After::time_event);
+            } else {
+                ask_timer();
+            }
             break;
         case Pending::arm_stuck:
             arm_all();
             if (still_stuck(stuck_)) end(Outcome::zeno, stuck_);
+            ask_timer();
             break;
-        case Pending::arm: arm_all(); break;
+        case Pending::arm:
+            arm_all();
+            ask_timer();
+            break;
     }
     if (ended_) return false;
     if (pending_ != Pending::nothing) return true;
-    return !resting_ && !search_.fired().empty() && apply_next_set();
+    if (!resting_ && !search_.fired().empty()) return apply_next_set(due_here_ && at_start);
+    return due_here_ && apply_due_time_event();
 }
 
 template <class X, bool single>
-inline bool EventEngine<X, single>::apply_next_set()
+inline bool EventEngine<X, single>::apply_next_set(bool on_time)
 {
     if (const std::size_t guard = endless_guard(); guard != no_guard) {
         end(Outcome::endless_cascade, guard);
@@ -40,11 +51,11 @@ inline bool EventEngine<X, single>::apply_next_set()
     search_.stay_at_start();
     place_set(step_.instant(0, 0));
     leave_from_start();
-    transform(false, false);
-    stuck_ = stuck_guard();
+    transform(on_time, false);
+    stuck_ = on_time ? no_guard : stuck_guard();
     if (stuck_ == no_guard) {
         note_left_alone(false);
-        apply(false, false);
+        apply(false, on_time);
         return !ended_;
     }
     if (bank_.g0(stuck_) < -bank_[stuck_].band) {
@@ -69,15 +80,21 @@ inline std::size_t EventEngine<X, single>::endless_guard()
             std::exchange(record.instant, instant_) == instant_ ? record.at_once + 1 : 1;
         if (record.at_once == most_at_once) return i;
     }
+    return repeats_level(fired) ? fired[0] : no_guard;
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::repeats_level(std::span<const std::size_t> fired)
+{
     // A loop of any length is met where a set is compared with the last one whose number is a power
     // of two.
-    if (level_ > 0 && cascade_.is(step_.x0(), step_.mode(), fired)) return fired[0];
+    if (level_ > 0 && cascade_.is(step_.x0(), step_.mode(), fired)) return true;
     if (std::has_single_bit(++level_)) {
         cascade_.x = step_.x0();
         cascade_.mode = step_.mode();
         cascade_.fired.assign(fired.begin(), fired.end());
     }
-    return no_guard;
+    return false;
 }
 
 template <class X, bool single>
@@ -91,14 +108,16 @@ inline std::size_t EventEngine<X, single>::stuck_guard()
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::arm_at_start()
+inline void EventEngine<X, single>::arm_at_start(bool begins)
 {
+    enters_mode_ = false;
     enable_guards();
     newly_armed_ = true;
     watching_ = false;
     last_h_ = h_next_;
     bank_.begin_phase(step_.time(0));
     bank_.sample_start(step_, calls(), h_next_);
+    bank_.keep_armed_values();
     for (std::size_t i = 0; i < bank_.size(); ++i) {
         const GuardRecord& record = bank_[i];
         const double g = bank_.g0(i);
@@ -107,7 +126,7 @@ inline void EventEngine<X, single>::arm_at_start()
             throw_start_guard_not_finite(who_, i, record.info.name, options_.t_start, g);
         }
         const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && -g <= rounding_of(i));
-        if (record.info.unilateral && g < 0 && !on_surface) {
+        if (record.info.unilateral && g < 0 && !on_surface && is_enabled_here(i)) {
             throw_start_outside_mode(who_, i, record.info.name, options_.t_start, g);
         }
         if (on_surface) bank_[i].band = std::fabs(g);
@@ -117,9 +136,42 @@ inline void EventEngine<X, single>::arm_at_start()
             bank_.await(i, record.info.unilateral ? Side::above : Side::plateau);
         }
         if (record.info.unilateral && record.side == Side::below) {
-            search_.fired().push_back(i);
+            if (on_surface && counts_here(i)) search_.fired().push_back(i);
+        } else if (begins) {
+            fire_at_start(i);
         }
     }
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::fire_at_start(std::size_t i)
+{
+    const GuardRecord& record = std::as_const(bank_)[i];
+    const bool fires = record.info.at_start && !counts(record.side, record.info.crossing);
+    if (!fires) {
+        if (record.acting && is_beyond(record.side, record.info.crossing)) count_armed_beyond(i);
+        return;
+    }
+    if (counts_here(i)) fire_by_condition(i);
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::fire_by_condition(std::size_t i)
+{
+    const Side inside = side_left_by(bank_[i].info.crossing, Side::plateau);
+    if (bank_[i].acting) {
+        bank_.arm(i, opposite(inside));
+        search_.fired().push_back(i);
+    } else {
+        record_jump(i, inside);
+    }
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::fires_at_entry(std::size_t i) noexcept
+{
+    const GuardRecord& record = std::as_const(bank_)[i];
+    return record.info.at_entry && enters_mode_ && !counts(record.side, record.info.crossing);
 }
 
 template <class X, bool single>
@@ -128,9 +180,10 @@ inline void EventEngine<X, single>::enable_guards()
     for (std::size_t i = 0; i < bank_.size(); ++i) {
         const bool enabled = system_.enabled_in(i, step_.mode());
         const GuardRecord& now = std::as_const(bank_)[i];
-        if (enabled == now.enabled && !now.newly_enabled) continue;
+        const bool enters = enters_mode_ && now.info.at_entry;
+        if (enabled == now.enabled && !now.newly_enabled && !enters) continue;
         GuardRecord& record = bank_[i];
-        record.newly_enabled = enabled && !record.enabled;
+        record.newly_enabled = enabled && (enters || !record.enabled);
         if (record.newly_enabled) record.last = std::numeric_limits<double>::quiet_NaN();
         record.enabled = enabled;
     }
@@ -154,19 +207,20 @@ inline void EventEngine<X, single>::arm_all()
     last_h_ = h_next_;
     bank_.begin_phase(step_.time(0));
     bank_.sample_start(step_, calls(), h_next_);
+    bank_.keep_armed_values();
     bool goes_on = true;
     bank_.for_each_to_arm([&](std::size_t i) {
         if (!goes_on) return;
         if (!bank_[i].enabled) {
             bank_.arm(i, Side::plateau);
-        } else if (single || !bank_.stays_armed(i)) {
-            goes_on = arm_one(i, widest);
+        } else if (const bool opens = ends_veto(i); opens || single || !bank_.stays_armed(i)) {
+            goes_on = arm_one(i, widest, opens);
         }
     });
 }
 
 template <class X, bool single>
-inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
+inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool opens)
 {
     GuardRecord& record = bank_[i];
     const double g = bank_.g0(i);
@@ -181,8 +235,8 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
     record.estimated = false;
     const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
     const bool rounded = std::fabs(g) > band && is_flipped_by_rounding(i, before);
-    if (rounded) record.band = std::fabs(g);
-    bool on_surface = rounded || std::fabs(g) <= band;
+    if (rounded || opens) record.band = std::fabs(g);
+    bool on_surface = rounded || opens || std::fabs(g) <= band;
     Side side = on_surface ? heading(i) : side_of(g);
     const Crossing crossing = record.info.crossing;
     bool leaves = on_surface && counts(opposite(side), crossing) && leaves_at_once(i, side);
@@ -209,26 +263,47 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest)
     const bool flipped =
         side != Side::plateau && side == opposite(before) && counts(before, record.info.crossing);
     const bool pressed = kept_out && on_surface;
+    if (changed_mode_ && located_ && crossing == Crossing::either && record.fired &&
+        record.acting && side == before && side != Side::plateau) {
+        ++run_.statistics.either_relays;
+        run_.statistics.relay_guard = i;
+    }
     const bool arrived = on_surface && counts(opposite(side), record.info.crossing);
     // A fired guard without a reset may have been carried back by the reset of another.
     const Side at_set = located_ ? opposite(before) : before;
     const bool carried_back = !(resets_any_ && record.info.resets) && !on_surface &&
                               side == opposite(at_set) && counts(at_set, record.info.crossing);
-    const bool fires = leaves                 ? true
-                       : record.fired         ? pressed || carried_back
-                       : record.newly_enabled ? record.acting && (arrived || pressed)
-                                              : flipped;
+    const bool enters = record.newly_enabled && fires_at_entry(i);
+    const bool fires = leaves || enters                ? true
+                       : record.fired                  ? pressed || carried_back
+                       : record.newly_enabled || opens ? record.acting && (arrived || pressed)
+                                                       : flipped;
     if (fires && counts_here(i)) {
-        if (record.acting) {
+        if (enters) {
+            fire_by_condition(i);
+        } else if (record.acting) {
             search_.fired().push_back(i);
         } else {
             record_jump(i, before);
         }
+    } else if (record.newly_enabled && record.acting && is_beyond(side, crossing)) {
+        count_armed_beyond(i);
     }
     const bool is_new = record.fired || record.newly_enabled;
-    const bool outside = kept_out && !on_surface && g < 0 && is_new;
+    const bool outside = kept_out && !on_surface && g < 0 && is_new && is_enabled_here(i);
     if (outside) end(Outcome::outside_mode, i);
     return !outside;
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::ends_veto(std::size_t i)
+{
+    if (!system_->enabled_at || !leaves_phase_ || !on_time_) return false;
+    const GuardRecord& record = std::as_const(bank_)[i];
+    if (!record.acting || record.fired || record.newly_enabled || record.info.boolean) return false;
+    return lies_within_rounding(i) &&
+           !system_.enabled_at(i, mode_before_, step_.time(0), search_.before()) &&
+           is_enabled_here(i);
 }
 
 template <class X, bool single>
@@ -269,7 +344,7 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
         }
         if (sign_of(side) * guard.rate(t, step_.x0(), rate, h_next_) > noise) return false;
     }
-    return record.fired || std::fabs(guard.value(t, left)) <= rounding_of(i, t, left);
+    return record.fired || std::fabs(guard.value(t, left)) <= rounding_of(i, step_.mode(), t, left);
 }
 
 template <class X, bool single>
@@ -368,14 +443,14 @@ inline double EventEngine<X, single>::rate_ahead(std::size_t i, double ahead, do
 template <class X, bool single>
 inline double EventEngine<X, single>::rounding_of(std::size_t i)
 {
-    return rounding_of(i, step_.time(0), step_.x0());
+    return rounding_of(i, step_.mode(), step_.time(0), step_.x0());
 }
 
 template <class X, bool single>
-inline double EventEngine<X, single>::rounding_of(std::size_t i, double t, const X& x)
+inline double EventEngine<X, single>::rounding_of(std::size_t i, Mode mode, double t, const X& x)
 {
     constexpr double nudge = 8 * std::numeric_limits<double>::epsilon();
-    const auto guard = bank_.view(i, step_.mode(), calls());
+    const auto guard = bank_.view(i, mode, calls());
     const double g = guard.value(t, x);
     double beside = t * (1 + nudge);
     if (step_.inside(beside) != beside) beside = step_.inside(t * (1 - nudge));
@@ -392,6 +467,18 @@ inline double EventEngine<X, single>::rounding_of(std::size_t i, double t, const
 }
 
 template <class X, bool single>
+inline bool EventEngine<X, single>::may_end() const noexcept
+{
+    if (options_.max_steps < std::numeric_limits<std::uint64_t>::max()) return true;
+    if (options_.cancelled && !setup_.cancels_by_itself) return true;
+    if (options_.stop_at_event) return bank_.size() > 0 || timed_;
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        if (bank_[i].info.stop_after > 0) return true;
+    }
+    return false;
+}
+
+template <class X, bool single>
 inline void EventEngine<X, single>::refuse_bad_guards()
 {
     for (std::size_t i = 0; i < bank_.size(); ++i) {
@@ -404,6 +491,11 @@ inline void EventEngine<X, single>::refuse_bad_guards()
         }
         if (info.unilateral && info.crossing != Crossing::falling) {
             throw_unilateral_not_falling(who_, i, info.name);
+        }
+        if ((info.at_start || info.at_entry) &&
+            (info.unilateral || info.crossing == Crossing::either)) {
+            throw_no_condition(who_, i, info.name, info.at_start ? "at_start" : "at_entry",
+                               info.unilateral ? "unilateral" : "Crossing::either");
         }
         if (!(info.touch >= 0 && std::isfinite(info.touch))) {
             throw_bad_touch(who_, i, info.name, info.touch);

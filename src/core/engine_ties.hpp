@@ -39,7 +39,7 @@ double EventEngine<X, single>::rate_of_tie(std::size_t i)
     const double slope = std::fabs(rate);
     if (!(sign * rate < 0) || !std::isfinite(slope)) return 0;
     const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
-    const double reach = std::max(ulps, rounding_of(i, t, step_.x1()) / slope);
+    const double reach = std::max(ulps, rounding_of(i, step_.mode(), t, step_.x1()) / slope);
     if (!(std::fabs(g) <= 2 * slope * reach)) return 0;
     // A touch has a rate there that is itself no more than rounding.
     const double rate0 = rate_at(step_.time(0), step_.x0(), step_.rate0());

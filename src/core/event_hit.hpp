@@ -2,11 +2,14 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <vector>
 
+#include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detect/step_probe.hpp"
 #include "ricochet/hybrid/guard.hpp"
@@ -53,6 +56,54 @@ struct Note {
     Side side = Side::plateau;  ///< the side that the guard left
     Location where;
     std::size_t state = std::numeric_limits<std::size_t>::max();  ///< index of its state, if kept
+};
+
+/// Halves a bracket by the sides of the guard alone, down to the tolerance or neighbouring doubles.
+[[nodiscard]] Location bisect(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance);
+
+/// The places inside a step, as fractions, at which guards are evaluated of which only the sign has
+/// a meaning: where numbers are, and at all of those places in a step so long that few of its
+/// length make the run.
+class SignChecks {
+public:
+    static constexpr std::size_t most = CubicCheck::places.size() + 1;
+
+    template <class X>
+    SignChecks(const DetectorTable<X>& detector, bool left_out, const Options& options) noexcept
+        : everywhere_(detector.screening == Screening::every),
+          inside_(detector.checks_inside && options.check_inside && !left_out),
+          long_(std::fabs(options.t_end - options.t_start) / 16)
+    {
+    }
+
+    /// Whether all places are asked for by the length of the step.
+    [[nodiscard]] bool is_long(double h) const noexcept { return inside_ && std::fabs(h) > long_; }
+
+    /// For a search. `everywhere`: the step has been screened there.
+    [[nodiscard]] std::span<const double> places(double h, bool everywhere) const noexcept
+    {
+        if (everywhere_ || everywhere || is_long(h)) return all;
+        return std::span(few).first(inside_ ? few.size() : 0);
+    }
+    /// For a step that is screened guard by guard.
+    [[nodiscard]] std::span<const double> places_screened(double h) const noexcept
+    {
+        return is_long(h) ? std::span<const double>(all) : std::span(few).first(inside_ ? 1 : 0);
+    }
+
+private:
+    static constexpr std::array few = {CubicCheck::inside, CubicCheck::further};
+    static constexpr std::array<double, most> all = [] {
+        std::array<double, most> places{};
+        std::copy(CubicCheck::places.begin(), CubicCheck::places.end(), places.begin());
+        places.back() = CubicCheck::inside;
+        std::sort(places.begin(), places.end());
+        return places;
+    }();
+
+    bool everywhere_;
+    bool inside_;
+    double long_;  ///< [s]
 };
 
 /// Drops the recorded crossings beyond the offset s, and sorts the others by time.

@@ -1,6 +1,8 @@
 // All crossings in a step of guards that are only recorded.
 #pragma once
 
+#include <algorithm>
+
 #include "core/event_search.hpp"
 
 namespace ricochet::detail {
@@ -17,11 +19,10 @@ inline void EventSearch<X, single>::note_crossings(const CurrentStep& step, Bank
     Creep creep(step.h());
     for (int round = 0; round < most_rounds; ++round) {
         Watch watch = bank.watch(i, step, end);
-        const Finding finding = next_finding(probe, watch, bank, i);
+        Finding finding = next_finding(probe, watch, bank, i);
         if (finding.touch) continue;
         if (!finding.hit) return;
-        probe.watch(finding.side);
-        const Location where = find(probe, finding, bank, i).value();
+        const Location where = locate_first(probe, watch, bank, finding).value();
         const Side side = opposite(finding.side);
         bool counted = true;
         if (guard.system()->enabled_at) {

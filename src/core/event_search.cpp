@@ -13,4 +13,15 @@ void sort_notes_until(double s, std::vector<Note>& notes)
     });
 }
 
+Location bisect(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance)
+{
+    while (hi.s - lo.s > std::max(tolerance, path.finest(hi.s))) {
+        const double middle = lo.s + (hi.s - lo.s) / 2;
+        if (middle <= lo.s || middle >= hi.s) break;
+        const GuardSample sample = path.value(middle);
+        (path.has_left(sample) ? hi : lo) = sample;
+    }
+    return {.lo = lo.s, .hi = hi.s, .root = hi.s, .error = hi.s - lo.s};
+}
+
 }  // namespace ricochet::detail

@@ -18,6 +18,7 @@
 #include "core/event_hit.hpp"
 #include "core/guard_bank.hpp"
 #include "core/step.hpp"
+#include "core/step_cover.hpp"
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/resolved_parts.hpp"
 #include "ricochet/detail/series_guard.hpp"
@@ -37,8 +38,8 @@ class EventSearch {
 
 public:
     /// Keeps a reference to the finders.
-    EventSearch(const X& like, std::size_t guards, const Finders<X>& finders,
-                const EventResolution& resolution)
+    EventSearch(const SystemAt<X>& system, const X& like, std::size_t guards,
+                const Finders<X>& finders, const Options& options)
         : finders_(&finders),
           space_(like),
           before_(like),
@@ -46,7 +47,10 @@ public:
           lost_(like),
           hits_(guards),
           fired_(guards),
-          resolution_(resolution),
+          resolution_(options),
+          signs_(finders.detector,
+                 system->bounded && !defers(finders.detector, *system.operator->()), options),
+          cover_(system, finders, resolution_),
           evidence_(finders.detector.evidence)
     {
     }
@@ -81,8 +85,47 @@ public:
     [[nodiscard]] Evidence evidence() const noexcept { return evidence_; }
 
     /// Whether the step was divided to resolve a guard, and whether that was not enough.
-    [[nodiscard]] bool refined() const noexcept { return refined_; }
-    [[nodiscard]] bool unresolved() const noexcept { return unresolved_; }
+    [[nodiscard]] bool refined() const noexcept { return refined_ || cover_.refined(); }
+    [[nodiscard]] bool unresolved() const noexcept { return unresolved_ || cover_.unresolved(); }
+
+    /// What declared bounds tell of guards inside the current step.
+    [[nodiscard]] StepCover<X, single>& cover() noexcept { return cover_; }
+
+    /// What the bounds of guard i tell of the current step, at whose ends it has these values.
+    [[nodiscard]] Covered cover(const CurrentStep& step, const Bank& bank, std::size_t i,
+                                double start, double end, std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        const GuardSample from{.s = 0, .value = start}, to{.s = step.h(), .value = end};
+        return cover_.first_event(step, bank, guard, bank[i].side, from, from, to);
+    }
+
+    /// Whether the bounds of guard i, which ends the step on its side, show an event inside.
+    [[nodiscard]] bool bounds_show_event(const CurrentStep& step, const Bank& bank, std::size_t i,
+                                         std::uint64_t& calls)
+    {
+        const GuardSample end = bank.end(i, step.h());
+        if (bank[i].info.boolean) return cover_.in_use() && changes_inside(step, bank, i, calls);
+        if (!cover_.covers(bank[i]) || !(sign_of(bank[i].side) * end.value > 0)) return false;
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        return cover_between(probe, bank, bank[i].side, bank.start(i), end).leaves;
+    }
+
+    /// Whether a guard of which only the sign has a meaning has left its side inside the step.
+    [[nodiscard]] bool changes_inside(const CurrentStep& step, const Bank& bank, std::size_t i,
+                                      std::uint64_t& calls)
+    {
+        const auto guard = bank.view(i, step.mode(), calls);
+        Probe probe(guard, step, space_);
+        for (const double u : signs_.places_screened(step.h())) {
+            if (has_left(bank[i].side, probe.dense_value(u * step.h()).value)) return true;
+        }
+        return false;
+    }
+    /// Whether guards of which only the sign has a meaning are evaluated at all places inside a
+    /// step of this length.
+    [[nodiscard]] bool checks_signs_closely(double h) const noexcept { return signs_.is_long(h); }
 
     /// Whether the set was only found at a step after the one that held it.
     [[nodiscard]] bool late() const noexcept { return late_; }
@@ -113,22 +156,10 @@ public:
         return where(i).lo == step.h();
     }
 
-    [[nodiscard]] const Location& where(std::size_t guard) noexcept
-    {
-        for (Hit& hit : hits_) {
-            if (hit.guard == guard) return hit.where;
-        }
-        return hits_[0].where;
-    }
+    [[nodiscard]] const Location& where(std::size_t guard) noexcept { return hit_of(guard).where; }
 
     /// Side that a guard of the set leaves. Within the step it may have come there from the other.
-    [[nodiscard]] Side side_left(std::size_t guard) noexcept
-    {
-        for (const Hit& hit : hits_) {
-            if (hit.guard == guard) return hit.side;
-        }
-        return hits_[0].side;
-    }
+    [[nodiscard]] Side side_left(std::size_t guard) noexcept { return hit_of(guard).side; }
 
     /// Finds the first set of acting guards in the step; a time event that is due at
     /// its end belongs to it if it lies in the window. False: none.
@@ -244,12 +275,10 @@ public:
     }
 
     /// Value |g| at the set, where `meet_conditions` has evaluated the guard; else NaN.
-    [[nodiscard]] double value_at_set(std::size_t i) const noexcept
+    [[nodiscard]] double value_at_set(std::size_t i) noexcept
     {
-        for (const Hit& hit : hits_) {
-            if (hit.guard == i && values_known_) return std::fabs(hit.value);
-        }
-        return std::numeric_limits<double>::quiet_NaN();
+        return values_known_ ? std::fabs(hit_of(i).value)
+                             : std::numeric_limits<double>::quiet_NaN();
     }
 
     /// Keeps the flow at the set, or where the motion is straight until there.
@@ -326,6 +355,17 @@ private:
 
     static constexpr int most_rounds = 1'000'000;
 
+    /// The hit of a guard of the set.
+    [[nodiscard]] Hit& hit_of(std::size_t guard) noexcept
+    {
+        if constexpr (!single) {
+            for (Hit& hit : hits_) {
+                if (hit.guard == guard) return hit;
+            }
+        }
+        return hits_[0];
+    }
+
     void fit(const X& like)
     {
         if (space_.x.size() != like.size()) {
@@ -350,9 +390,11 @@ private:
     [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Bank& bank, std::size_t i)
     {
         if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
-        if (bank[i].info.boolean) return heed(bank, i, watch, Ends{}.examine(probe, watch));
+        if (bank[i].info.boolean) return heed(bank, i, watch, next_change(probe, watch, bank));
         if (bank.has_series(i)) return heed(bank, i, watch, next_on_series(probe, watch, bank, i));
-        if (!bank.checked()) return heed(bank, i, watch, finders_->examine(probe, watch));
+        if (cover_.covers(bank[i]))
+            return heed(bank, i, watch, next_under_bound(probe, watch, bank));
+        if (!bank.checked()) return heed(bank, i, watch, next_by_own_size(probe, watch, bank, i));
         return heed(bank, i, watch, next_in_parts(probe, watch, bank, i));
     }
 
@@ -361,11 +403,106 @@ private:
     [[nodiscard]] Finding next_on_series(Probe& probe, Watch& watch, const Bank& bank,
                                          std::size_t i);
 
+    /// The next event of a guard of which only the sign has a meaning, from its values at the
+    /// places inside the step at which it is evaluated.
+    [[nodiscard]] Finding next_change(Probe& probe, Watch& watch, const Bank& bank) const
+    {
+        const GuardSample start = watch.start, end = watch.end;
+        const double h = probe.step().h();
+        std::array<GuardSample, SignChecks::most + 1> samples;
+        std::size_t count = 0;
+        int changes = 0;
+        Side side = watch.side;
+        const auto add = [&](const GuardSample& sample) {
+            samples[count++] = sample;
+            if (!has_left(side, sample.value)) return;
+            side = opposite(side);
+            ++changes;
+        };
+        for (const double u : signs_.places(h, bank.checked_everywhere())) {
+            if (u * h > start.s && u * h < end.s) add(probe.dense_value(u * h));
+        }
+        add(end);
+        // The bits of an event do not depend on where else the guard has been evaluated.
+        if (changes == 1 && resolution_.is_finest()) return Ends{}.examine(probe, watch);
+        for (std::size_t k = 0;; ++k) {
+            watch.end = samples[k];
+            const Finding finding = Ends{}.examine(probe, watch);
+            if (finding.hit || k + 1 == count) return finding;
+            watch.side = watch.side_after;
+            watch.start = watch.end;
+        }
+    }
+
+    /// Finding of the detector; where it finds no departure, the bounds of the guard are asked.
+    [[nodiscard]] Finding next_under_bound(Probe& probe, Watch& watch, const Bank& bank)
+    {
+        const Finding finding = finders_->examine(probe, watch);
+        if (finding.hit) return finding;
+        const Covered covered = cover_between(probe, bank, watch.side, watch.start, watch.end);
+        const bool touches_first = finding.touch && finding.hi.s <= covered.lo;
+        if (!covered.leaves || touches_first) return finding;
+        return departure(probe, watch, covered);
+    }
+
+    /// What the bounds of a guard tell of an interval.
+    [[nodiscard]] Covered cover_between(const Probe& probe, const Bank& bank, Side side,
+                                        const GuardSample& start, const GuardSample& end)
+    {
+        if (start.value == 0 && end.value == 0) return {.proved = false};  // it may rest there
+        return cover_.first_event(probe.step(), bank, probe.guard(), side, start, start, end);
+    }
+
+    [[nodiscard]] static Finding departure(Probe& probe, const Watch& watch, const Covered& covered)
+    {
+        const bool from_start = covered.lo == watch.start.s && covered.side == watch.side;
+        const GuardSample lo = from_start ? watch.start : probe.dense_value_and_rate(covered.lo);
+        return Finding::leaving(covered.side, lo, probe.dense_value_and_rate(covered.hi));
+    }
+
+    /// The departure that the bounds of the guard show before the end of one that the detector has
+    /// found.
+    [[nodiscard]] std::optional<Finding> earlier(Probe& probe, const Watch& watch, const Bank& bank,
+                                                 const Finding& finding, const GuardSample& end)
+    {
+        if (finding.late || !cover_.covers(bank[probe.guard().which()])) return std::nullopt;
+        const Covered covered = cover_.first_event(probe.step(), bank, probe.guard(), watch.side,
+                                                   watch.start, finding.lo, end);
+        if (!covered.leaves || !(covered.hi < end.s)) return std::nullopt;
+        return departure(probe, watch, covered);
+    }
+
+    /// A candidate among several, of which that with the first root is located first.
+    [[nodiscard]] Finding first_under_bound(Probe& probe, const Watch& watch, const Bank& bank,
+                                            const Finding& finding)
+    {
+        const auto before = earlier(probe, watch, bank, finding, finding.hi);
+        return before && before->hi.s < guess(finding) ? *before : finding;
+    }
+
     /// Where the guard turns between two samples on the same side, falling towards the surface at
     /// the first and rising at the second; nothing where its sign there is a matter of rounding.
     [[nodiscard]] static std::optional<GuardSample> turn_between(Probe& probe,
                                                                  const GuardSample& lo,
                                                                  const GuardSample& hi);
+
+    /// Finding of the detector. Some judge by the largest value of the guard so far: one that has
+    /// decayed since and changes its side is judged by its values in this step.
+    [[nodiscard]] Finding next_by_own_size(Probe& probe, Watch& watch, const Bank& bank,
+                                           std::size_t i) const
+    {
+        const Watch given = watch;
+        const Finding finding = finders_->examine(probe, watch);
+        const double own = bank.touch_of(i, given.scale);
+        if (finding.hit || !(own < 0.5 * given.touch)) return finding;
+        if (!has_left(given.side, given.end.value)) return finding;
+        const double rounded = std::max(own, probe.blur(given.end.s));
+        const double from = given.start.s > 0 ? rounded : std::fabs(given.start.value);
+        if (!(std::min(2 * from, std::fabs(given.end.value)) > rounded)) return finding;
+        watch = given;
+        watch.touch = rounded;
+        return finders_->examine(probe, watch);
+    }
 
     /// Finding of the detector on the parts of an interval, up to the first that is not clear.
     [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank, std::size_t i)
@@ -493,10 +630,7 @@ private:
             if (bank.is_cubic(i, departure)) probe.take_as_cubic();
             return finders_->locate(probe, finding.lo, finding.hi, tolerance);
         }
-        // A boolean guard always jumps.
-        Location where = Bisection{}.locate(probe, finding.lo, finding.hi, tolerance);
-        where.jump = false;
-        return where;
+        return bisect(probe, finding.lo, finding.hi, tolerance);
     }
 
     /// Continues behind a departure that the step's own map does not have, on the map's side.
@@ -574,7 +708,8 @@ private:
     /// Adds a hit of an acting guard, and its touches before it.
     void examine(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
     {
-        if (goes_plainly(bank, i, step.h(), bank.departure(i, step.h()))) {
+        const bool covered = cover_.covers(bank[i]);
+        if (!covered && goes_plainly(bank, i, step.h(), bank.departure(i, step.h()))) {
             return add_hit(i, Finding::leaving(bank[i].side, bank.start(i), bank.end(i, step.h())));
         }
         const auto guard = bank.view(i, step.mode(), calls);
@@ -593,7 +728,7 @@ private:
                 }
             }
             late_ = late_ || finding.late;
-            return add_hit(i, finding);
+            return add_hit(i, first_under_bound(probe, watch, bank, finding));
         }
     }
 
@@ -610,13 +745,28 @@ private:
         return std::isfinite(root) ? root : finding.hi.s;
     }
 
+    /// Locates a departure, or the one before it that the bounds of the guard show.
+    [[nodiscard]] std::optional<Location> locate_first(Probe& probe, const Watch& watch,
+                                                       const Bank& bank, Finding& finding)
+    {
+        for (;;) {
+            probe.watch(finding.side);
+            const auto where = find(probe, finding, bank, probe.guard().which());
+            if (!where) return where;
+            const GuardSample root{.s = where->root, .value = 0, .rate = where->slope};
+            const auto before = earlier(probe, watch, bank, finding, root);
+            if (!before) return where;
+            finding = *before;
+        }
+    }
+
     /// Locates a candidate, and keeps the state at its root if it is the first so far.
     void locate(const CurrentStep& step, Bank& bank, Hit& hit, std::uint64_t& calls)
     {
         const auto guard = bank.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
-        probe.watch(hit.side);
-        hit.where = find(probe, hit.finding, bank, hit.guard).value();
+        const Watch watch = bank.watch(hit.guard, step, bank.end(hit.guard, step.h()));
+        hit.where = locate_first(probe, watch, bank, hit.finding).value();
         hit.located = true;
         if (first_ && first_->where.root <= hit.where.root) {
             // Which of two equal roots is kept must not matter.
@@ -649,7 +799,7 @@ private:
         const Side side = bank[i].side;
         const GuardSample start = bank.start(i), end = bank.end(i, step.h());
         const double departure = bank.departure(i, step.h());
-        if (goes_plainly(bank, i, step.h(), departure)) {
+        if (!cover_.covers(bank[i]) && goes_plainly(bank, i, step.h(), departure)) {
             probe.watch(side);
             if (bank.is_cubic(i, departure)) probe.take_as_cubic();
             const double tolerance =
@@ -673,12 +823,11 @@ private:
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {
             Watch watch = bank.watch(i, step, bank.end(i, step.h()));
-            const Finding finding = next_finding(probe, watch, bank, i);
+            Finding finding = next_finding(probe, watch, bank, i);
             if (finding.touch) continue;
             if (!finding.hit) return false;
             late_ = finding.late;
-            probe.watch(finding.side);
-            const std::optional<Location> where = find(probe, finding, bank, i);
+            std::optional<Location> where = locate_first(probe, watch, bank, finding);
             if (!where) {
                 go_behind(probe, finding, bank, i);
                 continue;
@@ -762,6 +911,8 @@ private:
     std::vector<Note> notes_;
     std::vector<X> states_;  ///< of notes
     EventResolution resolution_;
+    SignChecks signs_;
+    StepCover<X, single> cover_;
     ResolvedParts parts_;
     bool refined_ = false;
     bool unresolved_ = false;

@@ -1,6 +1,8 @@
 // The first set of events where several guards may have one.
 #pragma once
 
+#include <algorithm>
+
 #include "core/event_search.hpp"
 
 namespace ricochet::detail {
@@ -136,10 +138,10 @@ inline double EventSearch<X, single>::lacks(const CurrentStep& step, Bank& bank,
     for (const std::size_t i : fired_) {
         for (Hit& hit : hits_) {
             if (hit.guard != i || hit.where.jump) continue;
-            // A member that the window has put together with later ones may have turned back.
-            const bool last = at_ - hit.where.root <= resolution_.blur(t);
             hit.value = bank.view(i, step.mode(), calls).value(t, x);
-            if (has_left(hit.side, hit.value) || !last) continue;
+            if (has_left(hit.side, hit.value)) continue;
+            // A member that the window has put together with later ones may have turned back.
+            if (!(at_ - hit.where.root <= resolution_.blur(t))) continue;
             const double wait = std::fabs(hit.value / hit.where.slope);
             longest = wait > longest || wait != wait ? wait : longest;
         }

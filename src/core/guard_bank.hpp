@@ -32,9 +32,10 @@ public:
     using Guards::view;
 
     GuardBank(const SystemAt<X>& system, const BankRules& rules, bool backward)
-        : Guards(system, rules, backward)
+        : Guards(system, rules, backward), keeps_rows_(size() > 1 || system->moded)
     {
         if (rules.keeps_sizes()) sizes_.resize(size());
+        if (keeps_rows_) armed_g_.resize(size());
     }
 
     /// Forgets the past of the guards, except for the numbers of their events.
@@ -49,6 +50,7 @@ public:
         }
         for (double& rests : at_rest_) rests = 0;
         for (double& size : sizes_) size = 0;
+        row_ = {};
         waiting_ = false;
         forget_screening();
         checked_ = Checked::not_at_all;
@@ -209,7 +211,7 @@ public:
                 .end = end,
                 .touch = touch(i, step.h()),
                 .scale = scale(i, step.h()),
-                .departs = record.departs && record.from == 0 && step.time(0) == armed_at_};
+                .departs = departs(record, step)};
     }
 
     [[nodiscard]] GuardSample start(std::size_t i) const noexcept
@@ -234,6 +236,13 @@ public:
     {
         constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
         return larger(records_[i].info.touch, ulps * largest);
+    }
+
+    /// Whether guard i starts the step on the surface where it has fired.
+    [[nodiscard]] bool starts_at_event(std::size_t i, const Step<X>& step) const noexcept
+    {
+        const GuardRecord& record = records_[i];
+        return departs(record, step) && std::fabs(g0_[i]) <= record.band;
     }
 
     /// The largest |g| that the ends of a step of length h suggest.
@@ -401,6 +410,20 @@ public:
     }
 
     [[nodiscard]] double g1(std::size_t i) const noexcept { return g1_[i]; }
+    // --- rows of lost excursions ---
+
+    /// Whether events of several guards, or in several modes, may accumulate together.
+    [[nodiscard]] bool keeps_rows() const noexcept { return keeps_rows_; }
+    [[nodiscard]] LostRow& row() noexcept { return row_; }
+    /// Keeps the values of the guards at the start of the step, after an acting instant.
+    void keep_armed_values() noexcept
+    {
+        if (!keeps_rows_) return;
+        for (std::size_t i = 0; i < size(); ++i) armed_g_[i] = g0_[i];
+    }
+    /// Guard i right after the last acting instant.
+    [[nodiscard]] double armed_value(std::size_t i) const noexcept { return armed_g_[i]; }
+
     [[nodiscard]] double g0(std::size_t i) const noexcept { return g0_[i]; }
     [[nodiscard]] double rate0(std::size_t i) const noexcept { return rate0_[i]; }
     void set_rate0(std::size_t i, double rate) noexcept { rate0_[i] = rate; }
@@ -427,7 +450,10 @@ public:
             visit(record.awaited);
             if (rules_.defers) visit(record.deferred);
             record.intervals.visit(visit);
+            if (keeps_rows_) record.excursions.visit(visit);
+            if (keeps_rows_) visit(armed_g_[i]);
         }
+        if (keeps_rows_) row_.visit(visit);
         visit(waiting_);
         visit(armed_at_);
         heed_enabled();
@@ -443,6 +469,11 @@ public:
     [[nodiscard]] bool waiting() const noexcept { return waiting_; }
 
 private:
+    [[nodiscard]] bool departs(const GuardRecord& record, const Step<X>& step) const noexcept
+    {
+        return record.departs && record.from == 0 && step.time(0) == armed_at_;
+    }
+
     template <class Change>
     void for_each_not_at_rest(const Change& change) noexcept
     {
@@ -522,6 +553,9 @@ private:
     bool rates_left_out_ = false;  ///< at the end of the current step
     double armed_at_ = std::numeric_limits<double>::quiet_NaN();  ///< [s]
     Doubles sizes_{};
+    Doubles armed_g_{};
+    LostRow row_;
+    bool keeps_rows_;
 };
 
 }  // namespace ricochet::detail

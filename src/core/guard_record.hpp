@@ -10,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/lost_row.hpp"
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/shrinking_intervals.hpp"
@@ -78,6 +79,7 @@ struct GuardRecord {
     bool deferred = false;  ///< its check is deferred: the bank holds nothing of this step
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
+    bool dips = false;          ///< its bounds show an event in the current step
     bool jumped = false;        ///< its last event was a jump
     bool departs = false;       ///< the current smooth phase started at its event, or enabled it
     double band =
@@ -90,8 +92,10 @@ struct GuardRecord {
     Side last_side = Side::plateau;                          ///< the side it left then
     bool returned = false;  ///< it has come back to that side from the other one
     ShrinkingIntervals intervals;
+    Excursions excursions;
     std::uint64_t instant = 0;  ///< the last at which it fired at the start of a step
     std::uint32_t at_once = 0;  ///< how often it did so then
+    bool armed_beyond = false;  ///< where it was armed at the start, or by a mode
 };
 
 [[nodiscard]] constexpr double sign_of(Side side) noexcept

@@ -26,11 +26,11 @@ template <class CurrentStep>
     };
     double size = 0;
     double speed = 0;
-    for_each_component(x, [&](auto i) {
+    for (decltype(x.size()) i = 0; i < x.size(); ++i) {
         // An infinite component, which means "never", has no size.
         if (std::fabs(x[i]) < 1e300) size = std::max(size, std::fabs(x[i]) / scale(i));
         speed = std::max(speed, std::fabs(dxdt[i]) / scale(i));
-    });
+    }
     // The state has no time scale here, nor is the distance to the end one.
     const double least = 1e-6 * std::min(1.0, span);
     const double guess = size > 1e-5 && speed > 1e-5 ? 0.01 * size / speed : least;
@@ -40,8 +40,9 @@ template <class CurrentStep>
     move(moved, x, euler, dxdt);
     step.flow(euler, moved, rate);
     double bend = 0;
-    for_each_component(
-        x, [&](auto i) { bend = std::max(bend, std::fabs(rate[i] - dxdt[i]) / scale(i)); });
+    for (decltype(x.size()) i = 0; i < x.size(); ++i) {
+        bend = std::max(bend, std::fabs(rate[i] - dxdt[i]) / scale(i));
+    }
     const double fastest = std::max(speed, bend / euler);
     const double h =
         fastest <= 1e-15 ? std::max(least, euler * 1e-3) : std::pow(0.01 / fastest, 1.0 / order);

@@ -67,9 +67,9 @@ std::unique_ptr<LendingLoop<X>> make_kept_loop(const RunSetup<X>& setup, const X
 }
 
 template <class X>
-std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0, const Options& options)
+Owner<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0, const Options& options)
 {
-    return make_kept_loop(setup, x0, options, true);
+    return Owner<AnyLoop<X>>(make_kept_loop(setup, x0, options, true).release());
 }
 
 template <class X>
@@ -88,17 +88,18 @@ struct KeptMonitor final : KeptSetup<X>, MonitorLoop<X, single> {
 };
 
 template <class X>
-std::unique_ptr<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
-                                            const Options& options, bool cuts_at_all)
+Owner<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like, const Options& options,
+                                  bool cuts_at_all)
 {
     RunSetup<X> shown = setup;
     shown.kernel = &host_kernel<X>;
     if constexpr (fixed_size<X>() > 0) {
         if (has_single_guard(setup)) {
-            return std::make_unique<KeptMonitor<X, true>>(shown, like, options, cuts_at_all);
+            return Owner<AnyMonitor<X>>(
+                new KeptMonitor<X, true>(shown, like, options, cuts_at_all));
         }
     }
-    return std::make_unique<KeptMonitor<X, false>>(shown, like, options, cuts_at_all);
+    return Owner<AnyMonitor<X>>(new KeptMonitor<X, false>(shown, like, options, cuts_at_all));
 }
 
 template <class X>
@@ -108,6 +109,18 @@ Run<X> run_whole(const RunSetup<X>& setup, const X& x0, const Options& options)
         if (has_single_guard(setup)) return Loop<X, true>(setup, x0, options).take();
     }
     return Loop<X, false>(setup, x0, options).take();
+}
+
+template <class X>
+void run_whole(const RunSetup<X>& setup, const X& x0, const Options& options,
+               void (*take)(void* out, const Run<X>& run), void* out)
+{
+    if constexpr (fixed_size<X>() > 0) {
+        if (has_single_guard(setup)) {
+            return take(out, Loop<X, true>(setup, x0, options).complete());
+        }
+    }
+    take(out, Loop<X, false>(setup, x0, options).complete());
 }
 
 /// Kernel of the quiet runs of a set-up: its own, or that of one of the library's methods.
@@ -128,16 +141,18 @@ QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
 
 }  // namespace ricochet::detail
 
-#define RICOCHET_CORE(...)                                                                      \
-    namespace ricochet::detail {                                                                \
-    using CoreStateHere = __VA_ARGS__;                                                          \
-    template std::unique_ptr<AnyLoop<CoreStateHere>> make_loop(const RunSetup<CoreStateHere>&,  \
-                                                               const CoreStateHere&,            \
-                                                               const Options&);                 \
-    template std::unique_ptr<LendingLoop<CoreStateHere>> make_lending_loop(                     \
-        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&);                  \
-    template std::unique_ptr<AnyMonitor<CoreStateHere>> make_monitor(                           \
-        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&, bool);            \
-    template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&, \
-                                          const Options&);                                      \
+#define RICOCHET_CORE(...)                                                                        \
+    namespace ricochet::detail {                                                                  \
+    using CoreStateHere = __VA_ARGS__;                                                            \
+    template Owner<AnyLoop<CoreStateHere>> make_loop(const RunSetup<CoreStateHere>&,              \
+                                                     const CoreStateHere&, const Options&);       \
+    template std::unique_ptr<LendingLoop<CoreStateHere>> make_lending_loop(                       \
+        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&);                    \
+    template Owner<AnyMonitor<CoreStateHere>> make_monitor(const RunSetup<CoreStateHere>&,        \
+                                                           const CoreStateHere&, const Options&,  \
+                                                           bool);                                 \
+    template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&,   \
+                                          const Options&);                                        \
+    template void run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&, \
+                            void (*)(void*, const Run<CoreStateHere>&), void*);                   \
     }

@@ -73,7 +73,13 @@ class LargeKernel {
                 }
             };
             if constexpr (Method::template ends_with<Row, raw>) {
-                at[i] = Method::template state_of<Row>({x0[i], rate0[i]}, s, weights, rate, newest);
+                constexpr std::size_t before = Method::template terms<Row> - 1;
+                double older = 0;
+                if constexpr (before > 0) {
+                    older = Method::template sum_of<Row, before>(weights, rate);
+                }
+                at[i] = Method::template state_of<Row>({x0[i], rate0[i]}, s, weights[before], older,
+                                                       newest);
                 if constexpr (keeps) sum[i] = Method::template sum_of<Row>(weights, rate);
             } else {
                 double bent = 0;

@@ -48,6 +48,10 @@ public:
           components_(static_cast<std::size_t>(x0.size())),
           quiet_(quiet_kernel(setup))
     {
+        if (std::isinf(options_.t_end)) {
+            endless_ = true;
+            options_.t_end = std::copysign(std::numeric_limits<double>::max(), options_.t_end);
+        }
         h_next_ = options_.step > 0 ? options_.step : std::fabs(options_.t_end - options_.t_start);
         if (error_controlled_) {
             if (step_.error_order() == 0) throw_no_error_estimate();
@@ -63,17 +67,16 @@ public:
         if (system_->forward_only && backward_) throw_forward_only();
         if (timed_) {
             if (backward_ && !system_->previous_time_event) throw_no_previous_time_event();
-            this->find_time_event(true);
+            this->find_time_event(Engine::After::start);
         }
         if (setup.detector.check) {
             const double smallest = error_controlled_ ? options_.h_min : options_.step;
             const double largest = error_controlled_ ? options_.h_max : options_.step;
             setup.detector.check(setup.detecting, setup.door, x0, smallest, largest);
         }
-        if (guarded_) {
-            this->arm_at_start();
-            this->settle_all();
-        }
+        if (guarded_) this->arm_at_start(!options_.continues);
+        if (endless_ && !this->may_end()) throw_endless(options.t_end);
+        if (guarded_ || timed_) this->settle_all();
     }
 
     [[nodiscard]] double t() const noexcept override  ///< [s]
@@ -156,6 +159,13 @@ public:
         return finish();
     }
 
+    /// Advances to the end; the result stays here.
+    [[nodiscard]] const Run<X>& complete()
+    {
+        run_to_end();
+        return bring_up_to_date();
+    }
+
     /// Returns the result so far; before the end its outcome is `cancelled`. The simulation is
     /// over.
     [[nodiscard]] Run<X> finish() override;
@@ -200,8 +210,10 @@ private:
     using Engine::bank_;
     using Engine::calls;
     using Engine::defers_;
+    using Engine::due_here_;
     using Engine::end;
     using Engine::ended_;
+    using Engine::endless_;
     using Engine::error_controlled_;
     using Engine::finders_;
     using Engine::guarded_;
@@ -347,7 +359,7 @@ private:
 
     /// Where the run was at a review, and the number of steps at which the next one is due.
     struct Review {
-        std::uint64_t due = 0, events = 0;
+        std::uint64_t due = 0, steps = 0, events = 0, instants = 0;
         double t = 0;
     };
     void renew(Review& review, std::uint64_t stride, bool is_first) noexcept;
@@ -361,18 +373,40 @@ private:
     }
 
     /// Whether the time has hardly advanced since a review that is due, or, without an event, so
-    /// little that not even a hundred times `max_steps` would reach the end.
+    /// little that not even a hundred times `max_steps` would reach the end. A motion that goes on
+    /// at the pace that it has had from the start, as an oscillation does, is never meant, however
+    /// far the end lies.
     [[nodiscard]] bool stands_still() const noexcept
     {
         const Statistics& counts = run_.statistics;
+        if (endless_) {
+            const double so_far = std::fabs(step_.until(options_.t_start));
+            return counts.steps >= stall_review_.due &&
+                   std::fabs(step_.until(stall_review_.t)) < 1e-6 * so_far;
+        }
         const double span = std::fabs(options_.t_end - options_.t_start);
+        const double so_far = std::fabs(step_.until(options_.t_start));
         const auto advances_less = [&](const Review& since, double part) {
-            return counts.steps >= since.due && std::fabs(step_.until(since.t)) < part * span;
+            const double advance = std::fabs(step_.until(since.t));
+            const auto steps = static_cast<double>(counts.steps - since.steps);
+            const bool shrunk = advance < 1e-6 * steps * first_step_;
+            return advance < part * span && (shrunk || advance < 1e-6 * so_far);
         };
         const double part =
             static_cast<double>(pace_steps()) / (1e2 * static_cast<double>(options_.max_steps));
-        return advances_less(stall_review_, 1e-9) ||
-               (counts.events == pace_review_.events && advances_less(pace_review_, part));
+        const auto is_due = [&](const Review& review) { return counts.steps >= review.due; };
+        const bool many_sets = is_due(set_review_) && !is_due(stall_review_) &&
+                               this->instant_ - set_review_.instants >= instants_to_stall();
+        return (is_due(stall_review_) && advances_less(stall_review_, 1e-9)) ||
+               (many_sets && advances_less(set_review_, 1e-9)) ||
+               (is_due(pace_review_) && counts.events == pace_review_.events &&
+                advances_less(pace_review_, part));
+    }
+
+    /// Number of instants with a set of events that have to advance the time as `stall_steps` do.
+    [[nodiscard]] std::uint64_t instants_to_stall() const noexcept
+    {
+        return std::max<std::uint64_t>(options_.stall_steps / 10, 1);
     }
 
     /// Ends the run after a failed step.
@@ -616,9 +650,8 @@ private:
     double longest_step_ = 0;        ///< [s] limit on the steps after it
     std::size_t careful_steps_ = 0;  ///< number of steps still to take without looking ahead
     std::uint64_t next_review_ = 0;  ///< number of steps at which to compare with the options
-    Review stall_review_, pace_review_;
+    Review stall_review_, set_review_, pace_review_;
     bool is_last_ = false;
-    int calm_steps_ = 0;  ///< number of consecutive steps without an event
     std::size_t next_sample_ = 0;
     std::size_t shown_samples_ = 0;  ///< number of samples shown by `advance`
     std::size_t shown_records_ = 0;  ///< and of events among those recorded

@@ -71,14 +71,13 @@ inline void Loop<X, single>::take_over(const QuietRun& quiet)
         bank_.take_back(quiet, step_, calls());
     }
     h_next_ = error_controlled_ || quiet.why == QuietEnd::due ? quiet.h_next : h_next_;
-    if (quiet.steps > 0) last_h_ = step_.h();
     Statistics& counts = run_.statistics;
-    counts.steps += quiet.steps;
     counts.rejected += quiet.rejected;
     counts.guard_calls += quiet.guard_calls;
-    if (bank_.size() > 0)
-        this->add_evidence(this->on_series_ ? Evidence::proved : finders_.detector.evidence,
-                           quiet.steps);
+    if (quiet.steps == 0) return;
+    last_h_ = step_.h();
+    counts.steps += quiet.steps;
+    if (bank_.size() > 0) this->add_evidence(this->evidence_of_quiet(), quiet.steps);
 }
 
 template <class X, bool single>
@@ -90,20 +89,11 @@ inline void Loop<X, single>::end_quiet_run(const QuietRun& quiet)
         const bool taken = error_controlled_
                                ? retry(h, h, quiet.repeated ? 1 : rule_.largest, quiet.error)
                                : take_fixed_step(h, true);
-        if (!taken || (guarded_ && handle_events())) {
-            calm_steps_ = 0;
-            return;
-        }
+        if (!taken || (guarded_ && handle_events())) return;
     } else if (this->on_series_ && !bank_.on_series()) {
-        if (handle_events()) {
-            calm_steps_ = 0;
-            return;
-        }
+        if (handle_events()) return;
     } else if (this->on_series_ || this->is_suspicious(quiet.why == QuietEnd::moving)) {
-        if (search(false)) {
-            calm_steps_ = 0;
-            return;
-        }
+        if (search(false)) return;
     } else {
         this->pass_on_clear();
     }

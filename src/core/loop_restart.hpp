@@ -48,16 +48,17 @@ void Loop<X, single>::start_at(double t, const X& x, Mode mode)
     first_step_ = h_next_;
     flight_start_ = t;
     longest_step_ = 0;
-    calm_steps_ = 0;
     careful_steps_ = 0;
     next_review_ = 0;
-    if (timed_) this->find_time_event(true);
+    due_here_ = this->timer_idles_ = false;
+    this->listed_at_ = Engine::stale;
+    if (timed_) this->find_time_event(Engine::After::restart);
     bank_.forget();
     if (guarded_) {
         search_.begin(step_.x0());
-        this->arm_at_start();
-        this->settle_all();
+        this->arm_at_start(false);
     }
+    if (guarded_ || timed_) this->settle_all();
 }
 
 template <class X, bool single>
@@ -113,9 +114,12 @@ void Loop<X, single>::extend(double t_end)
     const double now = step_.start().value;
     const bool ahead = backward_ ? t_end < now : t_end > now;
     if (std::isnan(t_end) || !ahead) throw_end_not_ahead(now, t_end);
+    const bool is_endless = std::isinf(t_end);
+    if (is_endless && !this->may_end()) throw_endless(t_end);
     if (is_tentative()) take_back();
-    options_.t_end = t_end;
-    (backward_ ? this->span_.from : this->span_.to) = t_end;
+    endless_ = is_endless;
+    options_.t_end = endless_ ? std::copysign(std::numeric_limits<double>::max(), t_end) : t_end;
+    (backward_ ? this->span_.from : this->span_.to) = options_.t_end;
     step_.renew_span();
     place_ = step_.place();
     reopen();

@@ -145,6 +145,8 @@ void Loop<X, single>::go_back_to_mark()
     next_sample_ = mark.next_sample;
     ended_ = false;
     pending_ = Engine::Pending::nothing;
+    due_here_ = false;
+    this->listed_at_ = Engine::stale;
     if (guarded_) {
         search_.fired().clear();
         search_.begin(step_.x0());

@@ -42,7 +42,8 @@ inline void Loop<X, single>::go_on_from_place()
 {
     step_.restart(place_);
     next_review_ = 0;
-    watching_ = replans_ = false;
+    watching_ = replans_ = due_here_ = false;
+    this->listed_at_ = Engine::stale;
     if (guarded_) search_.begin(step_.x0());
     if (defers_) planner_->restore(bank_);
 }

@@ -9,7 +9,7 @@ template <class X, bool single>
 inline const Options& Loop<X, single>::checked(const RunSetup<X>& setup, const Options& options,
                                                const X& x0)
 {
-    validate(options, !setup.error_controlled);
+    validate_but_for_end(options, !setup.error_controlled, "integrate");
     if (x0.size() == 0) throw_start_empty("integrate");
     for_each_component(x0, [&](auto i) {
         if (!std::isfinite(x0[i])) {

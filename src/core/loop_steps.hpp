@@ -47,13 +47,11 @@ bool Loop<X, single>::show_next()
 template <class X, bool single>
 inline void Loop<X, single>::run_to_end()
 {
+    const bool starts = !ended_ && next_review_ == 0 && step_.until(options_.t_end) > 0;
+    if (starts && !may_take_more_steps()) return;
     while (!ended_) {
-        // Where events follow each other closely a quiet run would end at its first step.
-        const std::uint64_t events = run_.statistics.events;
-        const bool calm = calm_steps_ > 1 || setup_.quiet_on_series;
-        if (calm && may_run_quietly() && run_quietly()) continue;
+        if (may_run_quietly() && run_quietly()) continue;
         advance_one({});
-        calm_steps_ = run_.statistics.events == events ? calm_steps_ + 1 : 0;
     }
 }
 
@@ -74,8 +72,9 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
     run_.x = step_.x0();
     run_.mode = step_.mode();
     this->collect_counts();
+    this->list_armed_beyond();
     if (ended_) {
-        emit_last_samples();
+        if (next_sample_ < options_.sample_times.size()) emit_last_samples();
         record_restart();
     }
     return run_;
@@ -110,8 +109,10 @@ bool Loop<X, single>::may_take_more_steps()
         end(Outcome::stalled);
     }
     renew(stall_review_, options_.stall_steps, is_first);
+    // No more sets than steps.
+    renew(set_review_, options_.stall_steps > 0 ? instants_to_stall() : 0, is_first);
     renew(pace_review_, pace_steps(), is_first);
-    next_review_ = std::min(stall_review_.due, pace_review_.due);
+    next_review_ = std::min({stall_review_.due, set_review_.due, pace_review_.due});
     return !ended_;
 }
 
@@ -122,7 +123,9 @@ void Loop<X, single>::renew(Review& review, std::uint64_t stride, bool is_first)
     if (!is_first && counts.steps < review.due) return;
     const bool fits = stride > 0 && options_.max_steps - counts.steps > stride;
     review = {.due = fits ? counts.steps + stride : options_.max_steps,
+              .steps = counts.steps,
               .events = counts.events,
+              .instants = this->instant_,
               .t = step_.start().value};
 }
 

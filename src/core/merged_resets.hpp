@@ -19,6 +19,7 @@
 #include <cstddef>
 #include <limits>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -26,6 +27,7 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/system_table.hpp"
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/stop.hpp"
 
 namespace ricochet::detail {
 
@@ -56,26 +58,31 @@ public:
         assign(after_, before);
         mode_ = mode;
         conflict_ = {no_guard, no_guard};
+        stops_ = false;
         if (fired.size() == 1 && !on_time && !system->reset_set) {
             const std::size_t i = fired[0];
             if (!system->reset || !bank[i].info.resets) return;
-            mode_ = system->reset(system.door(), i, mode, t, after_);
+            mode_ = ask(i, mode, [&] { return system->reset(system.door(), i, mode, t, after_); });
             return;
         }
         const auto resets = [&](std::size_t i) { return system->resets() && bank[i].info.resets; };
         if (system->reset_set && std::any_of(fired.begin(), fired.end(), resets)) {
-            mode_ = system->reset_set(system.door(), FiredGuards(fired, on_time), mode, t, after_);
+            const FiredGuards set(fired, on_time);
+            mode_ = ask(fired[0], mode,
+                        [&] { return system->reset_set(system.door(), set, mode, t, after_); });
             return;
         }
         members_ = {};
         for (const std::size_t i : fired) {
             if (resets(i)) add_member(i);
         }
-        if (on_time && system->timed()) add_member(time_event_reset);
+        if (on_time && system->time_reset) add_member(time_event_reset);
         const auto reset = [&](const Member& member, Mode in, X& x) {
-            return member.who == time_event_reset
-                       ? system->time_reset(system.door(), in, t, x)
-                       : system->reset(system.door(), member.who, in, t, x);
+            return ask(member.who, in, [&] {
+                return member.who == time_event_reset
+                           ? system->time_reset(system.door(), in, t, x)
+                           : system->reset(system.door(), member.who, in, t, x);
+            });
         };
         if (members_.size() == 1) {
             mode_ = reset(members_[0], mode, after_);
@@ -90,7 +97,7 @@ public:
                                  X& x, const X& before)
     {
         const X from = x;
-        mode_ = system->reset(system.door(), i, mode, t, x);
+        mode_ = ask(i, mode, [&] { return system->reset(system.door(), i, mode, t, x); });
         if (x.size() != from.size()) {
             assign(after_, x);
             return true;
@@ -99,7 +106,7 @@ public:
         for (std::size_t c = 0; c < size_of(from); ++c) {
             if (differs(x, from, c)) at(after_, c) = at(x, c);
         }
-        return mode_ != mode || !same_state(after_, before);
+        return stops_ || mode_ != mode || !same_state(after_, before);
     }
 
     [[nodiscard]] X& after() noexcept { return after_; }
@@ -114,7 +121,29 @@ public:
         return conflict_;
     }
 
+    /// Whether a reset has ended the run, which one, and the text that it gave.
+    [[nodiscard]] bool stops() const noexcept { return stops_; }
+    [[nodiscard]] std::size_t stopper() const noexcept { return stopper_; }
+    [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
+
 private:
+    /// The mode after a reset. The first that ends the run is noted, unless resets are asked again
+    /// in other orders.
+    template <class Reset>
+    [[nodiscard]] Mode ask(std::size_t who, Mode mode, const Reset& reset)
+    {
+        try {
+            return reset();
+        } catch (const Stop& stop) {
+            if (!stops_ && !asks_again_) {
+                stops_ = true;
+                stopper_ = who;
+                reason_ = stop.why();
+            }
+            return stop.mode().value_or(mode);
+        }
+    }
+
     struct Range {
         double least = std::numeric_limits<double>::infinity();
         double most = -std::numeric_limits<double>::infinity();
@@ -164,6 +193,15 @@ private:
             member.mode = reset(member, mode, member.result);
             resized = resized || member.result.size() != before.size();
         }
+        asks_again_ = true;
+        merge_all(before, mode, resized, reset, stands);
+        asks_again_ = false;
+    }
+
+    template <class Reset, class Stands>
+    void merge_all(const X& before, Mode mode, bool resized, const Reset& reset,
+                   const Stands& stands)
+    {
         if (resized) return merge_resized(before, mode);
         if (find_shared(before, mode)) {
             if (!stands.knows_flow() && agree(before, mode)) return merge(before, mode);
@@ -439,6 +477,10 @@ private:
     X single_;
     Mode mode_ = 0;
     std::pair<std::size_t, std::size_t> conflict_{no_guard, no_guard};
+    bool stops_ = false;       ///< a reset has ended the run
+    bool asks_again_ = false;  ///< resets that have been asked before
+    std::size_t stopper_ = no_guard;
+    std::string reason_;
     X along_;  ///< state between the resets of one order
     std::vector<Member> all_members_;
     std::span<Member> members_;  ///< of a set of several

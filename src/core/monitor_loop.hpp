@@ -73,15 +73,17 @@ public:
         run_.outcome = Outcome::reached_end;
         this->forget_cause();
         this->pending_ = Pending::nothing;
-        this->level_ = 0;
+        this->begin_instant();
         search_.fired().clear();
         if (defers_) planner_->forget_wrong();
         step_.restart(t, x, mode);
         place_rate(dxdt);
         h_next_ = scale;
-        if (timed_) this->find_time_event(true);
+        this->due_here_ = this->timer_idles_ = false;
+        this->listed_at_ = Engine::stale;
+        if (timed_) this->find_time_event(Engine::After::start);
         bank_.forget();
-        if (guarded_) this->arm_at_start();
+        if (guarded_) this->arm_at_start(!options_.continues);
         started_ = true;
         return or_start_anew([&] { return go_on(); });
     }
@@ -132,7 +134,7 @@ public:
         if (!due) return Verdict::rests;
         return or_start_anew([&] {
             cut_.s = 0;
-            this->level_ = 0;
+            this->begin_instant();
             step_.refresh();
             this->apply_time_event();
             return show_set();
@@ -178,6 +180,7 @@ public:
     [[nodiscard]] const Run<X>& run() noexcept override
     {
         this->collect_counts();
+        this->list_armed_beyond();
         return run_;
     }
     void clear_events() noexcept override { run_.events.clear(); }
@@ -208,7 +211,8 @@ public:
             throw;
         }
         step_.restart(place_);
-        this->watching_ = false;
+        this->watching_ = this->due_here_ = false;
+        this->listed_at_ = Engine::stale;
         this->forget_cause();
         this->pending_ = Pending::nothing;
         started_ = true;
@@ -315,7 +319,7 @@ private:
         step_.show(step);
         if (std::exchange(departs_, false)) step_.align_start();
         h_next_ = step.h;
-        this->level_ = 0;
+        this->begin_instant();
         if (holds_set()) {
             cut_.s = search_.at();
             this->cut_short();

@@ -183,6 +183,11 @@ public:
         end_interval();
     }
 
+    /// Defers those of the guards to be verified that their bounds clear on a division of the
+    /// current step. Tells the bank which of the others have an event inside.
+    void close_inside(const Step<X>& step, Bank& bank, EventSearch<X, single>& search,
+                      Statistics& counts);
+
     /// Guards that the exact detector verifies in the current step.
     [[nodiscard]] std::span<const std::size_t> judged() const noexcept { return judged_.span(); }
 
@@ -224,11 +229,8 @@ public:
             const double rate = same_end ? check.rate : std::numeric_limits<double>::quiet_NaN();
             check.verify = false;
             end.value = value_at(i, end, step.mode(), bank, counts);
-            end.bound = bound(i, end, step.mode(), bank[i].side);
-            check_change(i, last_check(i), end, bank);
-            plan_after(i, check, end, step.mode(), bank);
+            defer_from(i, end, step.mode(), bank);
             check.rate = rate;
-            schedule(i);
             bank.put_to_sleep(i);
         }
         judged_.clear();
@@ -375,6 +377,15 @@ private:
         plan_after(i, check, now, mode, bank);
     }
 
+    /// The same, from the end of a step that has been examined.
+    void defer_from(std::size_t i, Check end, Mode mode, const Bank& bank)
+    {
+        end.bound = bound(i, end, mode, bank[i].side);
+        check_change(i, last_check(i), end, bank);
+        plan_after(i, checks_[i], end, mode, bank);
+        schedule(i);
+    }
+
     /// Time [s] from here that needs no check by a gate; 0 without a gate.
     [[nodiscard]] double horizon(const Check& at, Mode mode)
     {
@@ -428,6 +439,12 @@ private:
         const double slope = std::isfinite(check.slope) ? check.slope : 0;
         const double then = check.bound.distance + slope * (check.sure - check.time);
         return meter_.asks() && !check.refused && then > detector_->lowest_level;
+    }
+
+    /// Whether a guard may tie with the end of the step, before which it has not crossed.
+    [[nodiscard]] static bool ties(const Step<X>& step, double from, double to) noexcept
+    {
+        return step.is_pinned() && std::fabs(to) <= 0x1p-20 * std::fabs(from);
     }
 
     [[nodiscard]] bool never_sleeps(const GuardRecord& record) const noexcept

@@ -24,9 +24,7 @@ inline std::size_t Planner<X, single>::close_one(std::size_t i, const Step<X>& s
         return none;
     }
     end = check_at(i, steps_.size(), step, bank, counts);
-    // A guard that ties with the end of the step has not crossed before it.
-    const bool may_tie =
-        step.is_pinned() && std::fabs(end.value) <= 0x1p-20 * std::fabs(from.value);
+    const bool may_tie = ties(step, from.value, end.value);
     std::size_t failed = narrow({i, step, bank, counts}, from, known.first, steps_.size(), end);
     if (may_tie && failed == none) {
         failed = steps_.size() - 1;
@@ -70,6 +68,38 @@ inline std::size_t Planner<X, single>::narrow(const Closing& on, Check& from, st
     const Check half = check_at(i, middle, step, bank, counts);
     const std::size_t failed = narrow(on, from, lo, middle, half);
     return failed != none ? failed : narrow(on, from, middle, hi, end);
+}
+
+template <class X, bool single>
+inline void Planner<X, single>::close_inside(const Step<X>& step, Bank& bank,
+                                             EventSearch<X, single>& search, Statistics& counts)
+{
+    std::size_t kept = 0;
+    for (std::size_t k = 0; k < judged_.size(); ++k) {
+        const std::size_t i = judged_[k];
+        judged_[kept] = i;
+        bank.note_dip(i, false);
+        ++kept;
+        if (never_sleeps(bank[i]) || !search.cover().covers(bank[i])) continue;
+        const Check start = check_of(step.time(0), step.x0());
+        Check end = check_of(step.time(step.h()), step.x1());
+        const double value = value_at(i, start, step.mode(), bank, counts);
+        end.value = value_at(i, end, step.mode(), bank, counts);
+        if (!(sign_of(bank[i].side) * end.value > 0)) continue;
+        if (ties(step, value, end.value)) continue;
+        if (bank.starts_at_event(i, step)) continue;  // its bounds leave the first part open
+        const Covered covered = search.cover(step, bank, i, value, end.value, counts.guard_calls);
+        if (covered.proved) {
+            checks_[i].verify = false;
+            defer_from(i, end, step.mode(), bank);
+            --kept;
+        } else {
+            remember(checks_[i], end.time, end.value);
+            bank.note_dip(i, covered.leaves);
+        }
+    }
+    judged_.shrink(kept);
+    find_limit();
 }
 
 }  // namespace ricochet::detail

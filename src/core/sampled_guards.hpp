@@ -30,6 +30,7 @@ protected:
         : system_(system), rules_(rules), backward_(backward)
     {
         const std::size_t count = system->guard_count(system.door());
+        if (count == 0) return;
         behind_.resize(count);
         records_.resize(count);
         at_rest_.resize(count);

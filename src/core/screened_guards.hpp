@@ -33,6 +33,7 @@ protected:
     ScreenedGuards(const SystemAt<X>& system, const BankRules& rules, bool backward)
         : Guards(system, rules, backward), suspects_(size()), marks_(size())
     {
+        if (size() == 0) return;
         if (rules.checks_inside) {
             for (auto* numbers : {&inside_, &further_, &worst_}) numbers->resize(size());
         }
@@ -40,6 +41,7 @@ protected:
         for (const GuardRecord& record : records_) {
             bands_ = bands_ || record.info.touch > 0;
             const int degree = record.info.degree;
+            signs_ = signs_ || record.info.boolean;
             of_time_ = of_time_ && degree >= 1 && degree <= 3 && !record.info.boolean;
             linear_ = linear_ && record.info.degree == 1 && !record.info.boolean;
         }
@@ -148,12 +150,16 @@ public:
         });
     }
 
+    /// Whether only the sign of any guard has a meaning.
+    [[nodiscard]] bool has_signs() const noexcept { return signs_; }
+
     /// Whether all guards are the cubics through their ends in a step in which only the time moves.
     [[nodiscard]] bool are_cubics_of_time() const noexcept { return of_time_; }
 
     /// Whether any guard needs a second evaluation inside the step, or a search.
     [[nodiscard]] bool doubtful(double h) noexcept
     {
+        if (single && ends_beyond(0)) return true;
         if (checked() && !waiting_ && !bands_) {
             if (are_few()) {
                 return with_screen([&](auto screen) __attribute__((always_inline)) {
@@ -196,6 +202,13 @@ public:
         return !suspects_.empty();
     }
 
+    /// Whether guard i ends the step on its surface or beyond, where every screening of the library
+    /// suspects it.
+    [[nodiscard, gnu::always_inline]] bool ends_beyond(std::size_t i) const noexcept
+    {
+        return sign_[i] * g1_[i] <= 0 && sign_[i] != 0 && rules_.screening != Screening::own;
+    }
+
     /// Guards that need a search, in ascending order, as `begin_search` found them.
     [[nodiscard]] std::span<const std::size_t> suspects() const noexcept
     {
@@ -224,14 +237,23 @@ public:
     {
         return checked() ? deviation(cubic(i, h), i, h) : std::numeric_limits<double>::infinity();
     }
-    /// Whether such a deviation moves a root of guard i by less than a millionth of the step.
+    /// Whether such a deviation moves a root of guard i by less than `straight_part` of the step.
     [[nodiscard, gnu::always_inline]] bool is_cubic(std::size_t i, double e) const noexcept
     {
-        return 0x1p20 * e <= std::fabs(g1_[i] - g0_[i]);
+        return 0x1p26 * e <= std::fabs(g1_[i] - g0_[i]);
     }
 
     /// Whether the guards have been evaluated inside the step.
     [[nodiscard]] bool checked() const noexcept { return checked_ != Checked::not_at_all; }
+
+    /// Takes note of whether the bounds of guard i show an event inside the step.
+    void note_dip(std::size_t i, bool dips) noexcept
+    {
+        records_[i].dips = dips;
+        dips_ = dips_ || dips;
+        forget_screening();
+    }
+    void forget_dips() noexcept { dips_ = false; }
 
     /// Whether one of the `suspects` remains suspect after the findings of the search so far.
     [[nodiscard]] bool still_suspicious(std::size_t i, double h) const noexcept
@@ -242,7 +264,9 @@ public:
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
         if (sign_[i] == 0) return false;
+        if (!single && records_[i].dips) return true;
         if (has_series(i)) return !is_clear_of_series(i, h);
+        if (ends_beyond(i)) return true;
         const double band = sign_[i] * records_[i].info.touch;  // worth a check if it is reached
         const bool suspected = with_screen([&](auto screen) __attribute__((always_inline)) {
             return screen.suspects(sign_[i], {.value = g0_[i] - band, .rate = rate0_[i]},
@@ -451,7 +475,7 @@ protected:
     {
         suspects_.clear();
         screened_ = as_screened_ = true;
-        if (are_few() || bands_ || series_.coefficients) {
+        if (are_few() || bands_ || dips_ || series_.coefficients) {
             for (std::size_t i = 0; i < size(); ++i) add_if_suspicious(i, h);
             return;
         }
@@ -555,8 +579,10 @@ protected:
     bool starts_phase_ = false;
     bool waiting_ = false;      ///< whether any guard may be on a plateau
     bool bands_ = false;        ///< whether any guard declares a tolerance for touches
+    bool signs_ = false;        ///< whether only the sign of any guard has a meaning
     bool of_time_ = true;       ///< whether all guards are of degree 3 or less
     bool linear_ = true;        ///< whether all guards are of degree 1, and are screened as such
+    bool dips_ = false;         ///< whether the bounds of any guard show an event in the step
     bool screened_ = false;     ///< whether `suspects_` belongs to the current step
     bool as_screened_ = false;  ///< and no guard has changed since then
     // A value does not lie beside its rate: both are written one by one, see `HostStepTable`.

@@ -382,13 +382,17 @@ public:
     /// Whether only the time moves in the step: what `peek` sees is the start.
     [[nodiscard]] bool stands() const noexcept
     {
-        if (kernel_->interpolates() || state_.host) return false;
-        bool stands = true;
+        if (kernel_->departure || state_.host) return false;
+        double moves = 0;
         for_components([&](auto i) {
-            stands = stands && state_.x1[i] == state_.x0[i] && state_.rate0[i] == 0 &&
-                     state_.rate1[i] == 0;
+            moves += std::fabs(state_.x1[i] - state_.x0[i]);
+            moves += std::fabs(state_.rate0[i]) + std::fabs(state_.rate1[i]);
+            if (!kernel_->is_dopri5) return;
+            for (std::size_t k = 0; k < Dopri5::kept_stages; ++k) {
+                moves += std::fabs(state_.stages[k][i]);
+            }
         });
-        return stands;
+        return moves == 0;
     }
     [[nodiscard]] bool is_hosts() const noexcept { return state_.host; }
     /// Whether a host's path is the cubic through the states and rates at the ends.

@@ -98,7 +98,7 @@ GateRecipe gate_recipe(std::string_view spelled)
 namespace gates {
 
 Gate::Gate(Model model)
-    : classifier_(std::make_shared<const Classifier>(std::move(model))),
+    : classifier_(detail::Shared<Classifier>::make(std::move(model))),
       recipe_(gate_recipe(classifier_->model().recipe)),
       horizon_(checked_kind(classifier_->model()))
 {

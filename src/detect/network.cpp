@@ -63,8 +63,8 @@ void check_model_step(const Model& model, double smallest, double largest)
 
 }  // namespace detail
 
-Network::Network(Model model)
-    : classifier_(std::make_shared<const Classifier>(std::move(model))),
+BareNetwork::BareNetwork(Model model)
+    : classifier_(detail::Shared<Classifier>::make(std::move(model))),
       recipe_(recipe_named(classifier_->model().recipe))
 {
     if (this->model().kind != "event-classifier") {

@@ -92,8 +92,32 @@ void throw_no_previous_time_event()
         "previous_time_event");
 }
 
-void throw_time_event_not_ahead(std::string_view who, bool backward, double t, double found)
+void throw_no_condition(std::string_view who, std::size_t which, std::string_view name,
+                        std::string_view what, std::string_view but)
 {
+    throw std::invalid_argument(
+        fmt::format("{}: {} has {}, so it must be falling or rising, and not unilateral, got {}",
+                    who, guard_called(which, name), what, but));
+}
+
+void throw_endless(double t_end)
+{
+    throw std::invalid_argument(fmt::format(
+        "integrate: t_end must be a finite time where nothing else may end the run, got {}; "
+        "expected a guard with stop_after, stop_at_event, or max_steps, also beside a reset that "
+        "ends the run by Stop",
+        t_end));
+}
+
+void throw_time_event_not_ahead(std::string_view who, bool backward, bool by_state, double t,
+                                double found)
+{
+    if (by_state && !backward) {
+        throw std::invalid_argument(
+            fmt::format("{}: next_time_event(t, x) must return t or a time after it, or infinity; "
+                        "at the start t = {} it returned {}",
+                        who, t, found));
+    }
     throw std::invalid_argument(fmt::format(
         "{}: {} must return a time {} t, t excluded, or {}infinity; at the start t = {} it "
         "returned {}",

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "ricochet/integrate/run.hpp"
 
 namespace ricochet {
@@ -70,7 +72,8 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::time_event_not_ahead:
             return "asked for the time event after the one that has just happened, the system "
                    "returned a time that is not ahead; let next_time_event(t) exclude t, also "
-                   "where t is rounded, and return infinity where there is none";
+                   "where t is rounded, let time_reset change the state that next_time_event(t, x) "
+                   "answers for, and return infinity where there is none";
         case Outcome::wrong_dimension:
             return "the flow resized dxdt, or a reset, rest or time_reset shortened the state and "
                    "left the mode as it was; write into the components that are there, or declare "
@@ -92,6 +95,45 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::running: return "the run has not ended";
     }
     return "unknown outcome";
+}
+
+std::string describe(const Statistics& statistics, std::span<const std::string> guard_names)
+{
+    const auto named = [&](std::size_t guard) {
+        const bool has_name = guard < guard_names.size() && !guard_names[guard].empty();
+        return has_name ? guard_names[guard] : fmt::format("guard {}", guard);
+    };
+    std::string out;
+    if (statistics.declined_guard != no_guard) {
+        out = fmt::format(
+            "{} resets changed nothing, the last that of {}, which left the state and the mode "
+            "also beyond the surface; let it act where the condition of its event holds",
+            statistics.ineffective_resets, named(statistics.declined_guard));
+    }
+    if (statistics.either_relays > 0) {
+        out += fmt::format(
+            "{}from {} events of guards with Crossing::either another mode turned the motion back, "
+            "the last time at {}; give the guard a direction, let modes overlap by a small "
+            "hysteresis, or give the system a sliding mode (Filippov, set_valued())",
+            out.empty() ? "" : "; ", statistics.either_relays, named(statistics.relay_guard));
+    }
+    return out;
+}
+
+std::string detail::describe_run(Outcome outcome, const std::string& reason,
+                                 const std::vector<std::size_t>& armed_beyond)
+{
+    std::string out(describe(outcome));
+    if (!reason.empty()) out = "a reset ended the run: " + reason;
+    if (armed_beyond.empty()) return out;
+    out += armed_beyond.size() == 1 ? "; guard " : "; guards ";
+    for (std::size_t i = 0; i < armed_beyond.size(); ++i) {
+        if (i > 0) out += ", ";
+        out += std::to_string(armed_beyond[i]);
+    }
+    return out +
+           " began beyond its surface, and waited until it had returned (at_start and "
+           "at_entry let it fire there)";
 }
 
 }  // namespace ricochet

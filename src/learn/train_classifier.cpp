@@ -7,19 +7,20 @@ namespace ricochet::learn {
 std::string ClassifierTrial::describe() const
 {
     const double ratio = network_seconds / std::max(exact_seconds, 1e-12);
-    const std::string cost =
-        pays() ? fmt::format(
-                     "with the network a run takes {:.2f} of the time of checking the end of "
-                     "every step with Ends",
-                     ratio)
-               : fmt::format(
-                     "a check of the end of every step is faster: with the network a run takes "
-                     "{:.2f} times as long as with Ends",
-                     ratio);
-    const std::string verdict = learn::describe(rivals);
-    return fmt::format(
-        "{}; it asks the guard {} times instead of {}, and misses {} of {} events{}{}", cost,
-        network_calls, exact_calls, missed, events, verdict.empty() ? "" : "; ", verdict);
+    // The rivals, among them Ends, were timed on the same runs: there is one verdict, theirs.
+    std::string verdict = learn::describe(rivals);
+    if (verdict.empty()) {
+        verdict = pays() ? fmt::format(
+                               "with the network a run takes {:.2f} of the time of checking the "
+                               "end of every step with Ends",
+                               ratio)
+                         : fmt::format(
+                               "a check of the end of every step is faster: with the network a run "
+                               "takes {:.2f} times as long as with Ends",
+                               ratio);
+    }
+    return fmt::format("{}; it asks the guard {} times instead of {}, and misses {} of {} events",
+                       verdict, network_calls, exact_calls, missed, events);
 }
 
 namespace detail {

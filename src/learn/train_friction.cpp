@@ -7,6 +7,7 @@
 #include <cmath>
 #include <ctime>
 #include <limits>
+#include <memory>
 
 #include "../checks/require.hpp"
 #include "friction_models.hpp"

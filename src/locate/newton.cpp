@@ -173,9 +173,9 @@ void Search::halve_along(const GuardSample& sample)
 }
 
 /// Brackets the root predicted at s from `sample` as narrowly as rounding in the guard allows:
-/// from the predicted root outwards until the side changes. False if the side does not change
-/// within the bracket: either the prediction was wrong, or the guard is noise, which hides its
-/// root for as long as `noise` [s].
+/// from the predicted root outwards until the side changes. False if it does not change between two
+/// places in the bracket, and this is still wide: either the prediction was wrong, or the guard is
+/// noise, which hides its root for as long as `noise` [s].
 bool Search::close_in(const GuardSample& sample, double s, double& noise)
 {
     auto& [lo, hi] = bracket_;
@@ -217,7 +217,7 @@ bool Search::close_in(const GuardSample& sample, double s, double& noise)
         margin *= 2;
         if (margin > widest) return false;  // the prediction was wrong
     }
-    return false;
+    return bracket_.width() <= std::max(tolerance_, path_.finest(hi.s));
 }
 
 /// Ends the search where the guard is straight between `sample` and the root predicted from it.
@@ -252,10 +252,10 @@ bool Search::ends_straight(const GuardSample& sample, double correction, Locatio
     for (int k = 0; k < 3; ++k) {
         const double correction = -at.value / slope;
         const double distance = std::fabs(correction);
-        if (distance <= 1e-6 * h) break;
+        if (k == 0 && distance <= 0x1p-26 * h) break;  // a cubic
         if (!(distance <= 0.1 * h && bracket_.contains(s + correction))) break;
         s += correction;
-        if (distance <= 1e-4 * h) break;
+        if (distance <= 1e-6 * h) break;
         const GuardSample next = path_.dense_value(s);
         slope = (next.value - at.value) / correction;
         at = next;

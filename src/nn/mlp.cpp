@@ -136,9 +136,9 @@ Mlp<T>::Mlp(const Model& model, const MlpOptions& options)
                                     std::string(name(options.instruction_set)) +
                                     " is not supported here");
     }
-    const auto memory = std::make_shared<const Memory<T>>(model);
-    network_ = {memory->parameters, memory->widths.data(), model.layers.size()};
-    memory_ = memory;
+    memory_ = detail::Shared<void>::make<Memory<T>>(model);
+    const auto& memory = *static_cast<const Memory<T>*>(memory_.get());
+    network_ = {memory.parameters, memory.widths.data(), model.layers.size()};
 
     const detail::KernelTable& kernels = table(options.instruction_set);
     const bool relu = model.activation == Activation::relu;

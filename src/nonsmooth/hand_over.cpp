@@ -136,6 +136,10 @@ void add(Statistics& sum, const Statistics& more) noexcept
     sum.disabled += more.disabled;
     sum.unmet_conditions += more.unmet_conditions;
     sum.ineffective_resets += more.ineffective_resets;
+    if (more.declined_guard != no_guard) sum.declined_guard = more.declined_guard;
+    sum.either_relays += more.either_relays;
+    if (more.relay_guard != no_guard) sum.relay_guard = more.relay_guard;
+    sum.armed_beyond += more.armed_beyond;
     sum.evidence.proved += more.evidence.proved;
     sum.evidence.checked += more.evidence.checked;
     sum.evidence.gated += more.evidence.gated;

@@ -1,6 +1,7 @@
 #include "problems/zones.hpp"
 
 #include <complex>
+#include <memory>
 #include <numbers>
 
 #include "../checks/require.hpp"

@@ -1,6 +1,7 @@
 // Groups in lasting contact for the loop of a scene.
 #include <fmt/format.h>
 
+#include <memory>
 #include <utility>
 
 #include "ricochet/scene/simulate.hpp"

@@ -150,11 +150,8 @@ void Islands::depart_few(const Island& island, double h, bool with_error, const 
     Few w;
     Few end_rate;
     Few error{};
-    if (with_error) {
-        Method::template depart<true>(departure, x, h, stages.data(), {w, end_rate, error});
-    } else {
-        Method::template depart<false>(departure, x, h, stages.data(), {w, end_rate, error});
-    }
+    Method::depart(departure, x, h, stages.data(), {w, end_rate, error}, with_error,
+                   Method::inner_stages);
     seen_ = nullptr;
     std::ranges::copy(w, w_.begin());
     if (!with_error) return;  // a place in the current step, which has its record already
@@ -192,11 +189,8 @@ void Islands::depart(const Island& island, double h, bool with_error) const
         flow(island, point_, rate, s);
         for (std::size_t i = 0; i < n; ++i) rate[i] -= island.rate[i];
     };
-    if (with_error) {
-        Dopri5::depart<true>(departure, island.x, h, stages_.data(), {w_, end_rate_, error_});
-    } else {
-        Dopri5::depart<false>(departure, island.x, h, stages_.data(), {w_, end_rate_, error_});
-    }
+    Dopri5::depart(departure, island.x, h, stages_.data(), {w_, end_rate_, error_}, with_error,
+                   Dopri5::inner_stages);
     seen_ = nullptr;
 }
 

@@ -1,6 +1,7 @@
 #include "scene/world.hpp"
 
 #include <algorithm>
+#include <memory>
 
 #include "scene/islands.hpp"
 #include "scene/large_pages.hpp"

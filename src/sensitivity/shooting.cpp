@@ -57,6 +57,18 @@ void validate(const Shooting& shooting)
     require(s.max_iterations >= 0, "max_iterations must be zero or positive", s.max_iterations);
 }
 
+Eigen::VectorXcd floquet_multipliers(const Eigen::MatrixXd& monodromy)
+{
+    if (!monodromy.allFinite()) {
+        constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+        return Eigen::VectorXcd::Constant(monodromy.rows(), std::complex<double>(nan, nan));
+    }
+    Eigen::VectorXcd values = monodromy.eigenvalues();
+    std::sort(values.begin(), values.end(),
+              [](const auto& a, const auto& b) { return std::abs(a) > std::abs(b); });
+    return values;
+}
+
 namespace detail {
 
 namespace {
@@ -115,17 +127,6 @@ struct Correction {
     target.head(n) = -gap;
     const Eigen::VectorXd step = jacobian.colPivHouseholderQr().solve(target);
     return {step.head(n), step[n]};
-}
-
-[[nodiscard]] Eigen::VectorXcd multipliers_of(const Eigen::MatrixXd& monodromy)
-{
-    if (!monodromy.allFinite()) {
-        return Eigen::VectorXcd::Constant(monodromy.rows(), std::complex<double>(nan, nan));
-    }
-    Eigen::VectorXcd values = monodromy.eigenvalues();
-    std::sort(values.begin(), values.end(),
-              [](const auto& a, const auto& b) { return std::abs(a) > std::abs(b); });
-    return values;
 }
 
 /// A search in progress.
@@ -202,7 +203,7 @@ private:
             orbit.residual = scaled_gap(shot_, x_).lpNorm<Eigen::Infinity>();
             orbit.monodromy = shot_.monodromy;
         }
-        orbit.multipliers = multipliers_of(orbit.monodromy);
+        orbit.multipliers = floquet_multipliers(orbit.monodromy);
         return orbit;
     }
 

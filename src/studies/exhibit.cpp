@@ -89,8 +89,8 @@ std::string tics(std::string_view axis, const std::vector<double>& at)
 std::string script(const Panel& panel, std::size_t which, PlotFiles& files)
 {
     std::string out = fmt::format(
-        "set title {}\nset xlabel {}\nset ylabel {}\n{}set logscale x\n{}set logscale y\nset "
-        "yrange [*:*] {}reverse\n",
+        "set title {}\nset xlabel {}.\"\\n\"\nset ylabel {}\n{}set logscale x\n{}set logscale "
+        "y\nset yrange [*:*] {}reverse\n",
         in_quotes(panel.title), in_quotes(panel.x_label), in_quotes(panel.y_label),
         panel.log_x ? "" : "un", panel.log_y ? "" : "un", panel.downwards ? "" : "no");
     std::vector<std::string> parts;
@@ -234,16 +234,20 @@ void draw(const Exhibit& exhibit, const std::string& title, const std::filesyste
     std::size_t curves = 0;
     for (const Panel& panel : exhibit.panels) curves = std::max(curves, panel.curves.size());
     const std::size_t key = curves > 6 ? 26 * (curves - 2) : 0;  // a line each
+    // An empty line between the label of the axis and the key below it takes 22 pixels, a title 45.
+    const std::size_t top = title.empty() ? 15 : 60;
+    const std::string heading =
+        title.empty() ? "" : fmt::format(" title {}.\"\\n\"", in_quotes(title));
     std::string out =
-        plot_head(file, static_cast<int>(620 * across), static_cast<int>(60 + (420 + key) * down));
+        plot_head(file, static_cast<int>(620 * across), static_cast<int>(top + (442 + key) * down));
     out += fmt::format(
-        "set multiplot layout {},{} title {}.\"\\n\"\nset format x '%g'\nset format y '%g'\nset "
+        "set multiplot layout {},{}{}\nset format x '%g'\nset format y '%g'\nset "
         "key below samplen 2 "
         "spacing 1.1\n"
         "set palette defined (0 '#f4f8fb', 0.5 '#7fb0d6', 1 '#1f5fa8')\nset datafile missing "
         "'NaN'\n"
         "set offsets graph 0, graph 0, graph 0.06, graph 0.02\n",
-        down, across, in_quotes(title));
+        down, across, heading);
     PlotFiles files;
     for (std::size_t i = 0; i < count; ++i) out += script(exhibit.panels[i], i, files);
     ricochet::app::draw(files, out + "unset multiplot\n", file);

@@ -250,6 +250,19 @@ TEST_F(App, SamplesAreInTheJsonWhenAskedFor)
     EXPECT_EQ(run["trajectory"]["state"][0], nlohmann::json::array({10.0, 0.0}));
 }
 
+TEST_F(App, TheNetworkIsAGateByNameToo)
+{
+    const auto run_by = [&](const char* option) {
+        nlohmann::json out = json(simulate({option, "network", "--step", "0.01", "--json"}));
+        out.erase("seconds");
+        return out;
+    };
+    const nlohmann::json found = run_by("--gate");
+    EXPECT_EQ(found, run_by("--detector"));
+    EXPECT_EQ(found["detector"], "network");
+    expect_refused({"simulate", "thermostat", "--gate", "network"}, {"network", "thermostat"});
+}
+
 bool has_gnuplot()
 {
     std::istringstream path(std::getenv("PATH") != nullptr ? std::getenv("PATH") : "");
@@ -268,6 +281,23 @@ TEST_F(App, PlotsAreDrawnAsSvgAndPng)
     EXPECT_EQ(files(), (Words{"ball.png", "ball.svg"}));
     EXPECT_NE(content(work() / "ball.svg").find("</svg>"), std::string::npos);
     EXPECT_TRUE(content(work() / "ball.png").starts_with("\x89PNG"));
+}
+
+TEST_F(App, AComponentIsDrawnOverAnother)
+{
+    expect_refused(simulate({"--phase", "u,v"}), {"--phase", "--plot"});
+    for (const char* wrong : {"u", "u,", "u,w", "u,v,u", ","}) {
+        expect_refused(simulate({"--plot", "ball.svg", "--phase", wrong}),
+                       {"--phase", "u, v", std::string("'") + wrong + "'"});
+    }
+    expect_refused({"simulate", "fault", "--plot", "fault.svg", "--phase", "slip,velocity"},
+                   {"--phase", "fault"});
+    if (!has_gnuplot()) GTEST_SKIP() << "gnuplot is not installed";
+    ASSERT_EQ(run(simulate({"--plot", "ball.svg", "--phase", "v,u"})).status, 0);
+    const std::string drawn = content(work() / "ball.svg");
+    EXPECT_NE(drawn.find("velocity v [m/s]"), std::string::npos);
+    EXPECT_NE(drawn.find("height u [m]"), std::string::npos);
+    EXPECT_EQ(drawn.find("time t [s]"), std::string::npos);
 }
 
 TEST_F(App, NameOfAPlotIsNotExecuted)

@@ -1,6 +1,7 @@
 // `ricochet ensemble`: tables, shares, results, and processes that are killed.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdlib>

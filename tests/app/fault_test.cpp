@@ -2,6 +2,8 @@
 
 #include "app.hpp"
 
+#include <algorithm>
+
 namespace ricochet::fault_test {
 namespace {
 

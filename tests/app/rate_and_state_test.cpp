@@ -62,5 +62,22 @@ TEST_F(App, RefusesWhatTheSpringSliderIsNot)
     refused({"--detector", "ends"}, {"--detector is not for the spring-slider"});
 }
 
+TEST_F(App, TheLabelsOfASpringSliderAreInItsPicture)
+{
+    // Numbers such as 0.00035 are the widest that a tic has. A label is centred on a point that is
+    // half a letter of 15 pixels from its left edge, at least.
+    const Result result = run({"simulate", "spring-slider", "--plot", "slider.svg"});
+    if (result.err.find("gnuplot-nox") != std::string::npos) GTEST_SKIP() << result.err;
+    ASSERT_EQ(result.status, 0) << result.err;
+    const std::string drawn = content(work() / "slider.svg");
+    int labels = 0;
+    for (std::size_t at = 0; (at = drawn.find(") rotate(270)", at)) != std::string::npos; ++at) {
+        const std::size_t from = drawn.rfind("translate(", at) + 10;
+        EXPECT_GE(std::stod(drawn.substr(from)), 15) << drawn.substr(at, 200);
+        ++labels;
+    }
+    EXPECT_EQ(labels, 5);
+}
+
 }  // namespace
 }  // namespace ricochet::rate_and_state_test

@@ -33,6 +33,36 @@ TEST_F(App, ThePageOfSystemsIsWhatTheCommandPrints)
     expect_refused({"systems", "--json", "--markdown"}, {"--json"});
 }
 
+TEST_F(App, SystemsGivesTheEquationsOfEveryLawOfFriction)
+{
+    // Every parameter of a law is a word of its equations.
+    const auto words_of = [&](const std::string& name, const Words& words) {
+        for (const nlohmann::json& system : json({"systems", "--json"})) {
+            if (system["name"] != name) continue;
+            std::string all;
+            for (const std::string line : system["equations"]) all += line + '\n';
+            for (const std::string& word : words) {
+                EXPECT_NE(all.find(word), std::string::npos) << name << ": " << word;
+            }
+            EXPECT_NE(run({"systems"}).out.find(all.substr(0, all.find('\n'))), std::string::npos);
+            return;
+        }
+        ADD_FAILURE() << name;
+    };
+    const Words rate_state{"f_star", "v_star", "d_rs", "law 0", "law 1", "law 2", "theta'"};
+    words_of("spring-slider", rate_state);
+    words_of("spring-slider", {"k_critical", "mass", "ratio", "velocity^2", "unstable"});
+    words_of("fault", rate_state);
+    words_of("fault", {"residual_friction", "friction_drop", "slip_distance"});
+    words_of("friction-inclusion", {"law 0", "law 1", "law 2", "law 3", "weakening", "residual"});
+    words_of("stick-slip", {"friction", "weakening", "belt-speed"});
+    words_of("coulomb-oscillator", {"friction", "static-friction"});
+    words_of("rolling-ball", {"friction", "resistance"});
+    for (const char* name : {"incline-block", "woodpecker", "two-contact-block"}) {
+        words_of(name, {"friction", "against"});
+    }
+}
+
 TEST_F(App, SystemsListsEveryReadySystemWithItsGuardsAndModes)
 {
     const nlohmann::json all = json({"systems", "--json"});

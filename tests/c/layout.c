@@ -21,6 +21,8 @@ int main(void)
     AT(rc_guard_info, degree);
     AT(rc_guard_info, touch);
     AT(rc_guard_info, lipschitz);
+    AT(rc_guard_info, at_start);
+    AT(rc_guard_info, at_entry);
     SIZE(rc_callbacks);
     AT(rc_callbacks, size);
     AT(rc_callbacks, dimension);
@@ -47,6 +49,11 @@ int main(void)
     AT(rc_callbacks, lower_bound);
     AT(rc_callbacks, upper_bound);
     AT(rc_callbacks, parameter);
+    AT(rc_callbacks, next_time_event_at);
+    AT(rc_callbacks, time_events);
+    AT(rc_callbacks, time_event_count);
+    AT(rc_callbacks, time_event_period);
+    AT(rc_callbacks, time_event_phase);
     SIZE(rc_options);
     AT(rc_options, size);
     AT(rc_options, t_start);
@@ -76,6 +83,7 @@ int main(void)
     AT(rc_options, gate);
     AT(rc_options, component_atol);
     AT(rc_options, component_count);
+    AT(rc_options, continues);
     SIZE(rc_callback_error);
     AT(rc_callback_error, size);
     AT(rc_callback_error, code);
@@ -108,6 +116,12 @@ int main(void)
     AT(rc_statistics, assumed);
     AT(rc_statistics, guard);
     AT(rc_statistics, other_guard);
+    AT(rc_statistics, unmet_conditions);
+    AT(rc_statistics, ineffective_resets);
+    AT(rc_statistics, declined_guard);
+    AT(rc_statistics, either_relays);
+    AT(rc_statistics, relay_guard);
+    AT(rc_statistics, armed_beyond);
     SIZE(rc_event);
     AT(rc_event, size);
     AT(rc_event, t);

@@ -97,6 +97,27 @@ static void a_relay_is_reported(void)
     simulation = run_from(&callbacks, 1, 3);
     CHECK(rc_outcome(simulation) == RC_ENDLESS_CASCADE);
     CHECK(fabs(rc_time(simulation) - 1) < 1e-14);
+    CHECK(statistics_of(simulation).declined_guard == RC_NO_GUARD);
+    rc_simulation_free(simulation);
+}
+
+static int leave_alone(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)x, (void)n;
+    return 0;
+}
+
+static void a_reset_that_declines_is_named(void)
+{
+    rc_callbacks callbacks = callbacks_of(relay_flow, relay_guard, leave_alone);
+    rc_simulation* simulation;
+    rc_statistics statistics;
+    callbacks.mode_count = 2;
+    simulation = run_from(&callbacks, 1, 3);
+    CHECK(rc_outcome(simulation) == RC_REACHED_END);
+    statistics = statistics_of(simulation);
+    CHECK(statistics.ineffective_resets == 1 && statistics.declined_guard == 0);
+    CHECK(statistics.either_relays == 0 && statistics.relay_guard == RC_NO_GUARD);
     rc_simulation_free(simulation);
 }
 
@@ -153,10 +174,64 @@ static void resets_of_a_common_component_follow_each_other(void)
     rc_simulation_free(simulation);
 }
 
+/* A dip of 4e-5 s in a step of any length, within a true bound. */
+
+static int unit_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+{
+    (void)user, (void)mode, (void)t, (void)x, (void)n;
+    dxdt[0] = 1;
+    return 0;
+}
+
+static int dip(void* user, size_t which, rc_mode mode, double t, const double* x, size_t n,
+               double* g)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)n;
+    *g = fmin(1, 50 * fabs(x[0] - 0.37) - 1e-3);
+    return 0;
+}
+
+static int at_most_50(void* user, size_t which, rc_mode mode, double t, const double* x, size_t n,
+                      double* bound)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)x, (void)n;
+    *bound = 50;
+    return 0;
+}
+
+static void a_dip_within_a_true_bound_is_found(void)
+{
+    const double steps[] = {0, 0.3, 0.1}; /* 0: dopri5 under error control */
+    rc_callbacks callbacks = callbacks_of(unit_flow, dip, NULL);
+    size_t k;
+    callbacks.speed_bound = at_most_50;
+    callbacks.acceleration_bound = NULL;
+    callbacks.guard_rate = NULL;
+    for (k = 0; k < 3; ++k) {
+        const double start = 0;
+        rc_options options = options_until(1);
+        rc_system* system;
+        rc_simulation* simulation;
+        options.detector = RC_PLANNED;
+        options.step = steps[k];
+        options.fixed_step = k > 0;
+        if (k > 0) options.method = RC_RK4;
+        CHECK_STATUS(RC_OK, rc_system_new(&callbacks, &system));
+        CHECK_STATUS(RC_OK, rc_simulation_new(system, &start, 1, &options, &simulation));
+        rc_system_free(system);
+        CHECK_STATUS(RC_OK, rc_run(simulation));
+        CHECK(statistics_of(simulation).events == 1);
+        CHECK(statistics_of(simulation).unresolved_steps == 0);
+        rc_simulation_free(simulation);
+    }
+}
+
 int main(void)
 {
+    a_dip_within_a_true_bound_is_found();
     a_room_stays_in_its_band();
     a_relay_is_reported();
+    a_reset_that_declines_is_named();
     resets_of_a_common_component_follow_each_other();
     return 0;
 }

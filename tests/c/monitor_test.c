@@ -544,31 +544,8 @@ static void keep(struct place* place, const struct failing* world, rc_monitor* m
 static void run_failing(const rc_callbacks* callbacks, struct failing* world, struct met* met,
                         size_t* failures)
 {
-    static const rc_callbacks plain_fall = {sizeof plain_fall,
-                                            2,
-                                            0,
-                                            0,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            ball_flow,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL,
-                                            NULL};
+    static const rc_callbacks plain_fall = {
+        .size = sizeof plain_fall, .dimension = 2, .flow = ball_flow};
     static struct place place;
     rc_monitor* monitor = monitor_of(callbacks, NULL);
     rc_verdict verdict;

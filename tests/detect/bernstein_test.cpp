@@ -775,6 +775,44 @@ TEST(Bernstein, WhereTheGuardIsNotANumberNothingIsCheckedOnlyAssumed)
     EXPECT_EQ(finding.evidence, Evidence::assumed);
 }
 
+/// A spiral whose coordinates are zero in turn, four times in a turn.
+struct Spiral {
+    using State = std::array<double, 2>;
+    double decay = 0;
+    void flow(double, const State& x, State& dxdt) const
+    {
+        dxdt = {-decay * x[0] - x[1], x[0] - decay * x[1]};
+    }
+    template <class V>
+    [[nodiscard]] double guard(double, const V& x) const
+    {
+        return x[0] * x[1];
+    }
+    [[nodiscard]] GuardInfo guard_info() const
+    {
+        return {.crossing = Crossing::either, .resets = false};
+    }
+};
+
+TEST(Bernstein, CrossingsOfAGuardThatDecaysAreNoTouches)
+{
+    // At the strongest decay it falls to 1e-104.
+    for (const double decay : {0.01, 0.1, 0.3}) {
+        for (const double rtol : {1e-6, 1e-9}) {
+            const Options options{.t_end = 255 * pi / 2, .rtol = rtol, .atol = 0};
+            const auto run = integrate(Spiral{decay}, {1.0, 0.1}, options,
+                                       ErrorControlled<Dopri5>{}, Bernstein{});
+            ASSERT_EQ(run.events.size(), 255u) << decay;
+            const double first = pi / 2 - std::atan(0.1);
+            for (std::size_t k = 0; k < run.events.size(); ++k) {
+                EXPECT_EQ(run.events[k].kind, EventKind::crossing);
+                // The phase drifts by less than the tolerance in every radian.
+                EXPECT_NEAR(run.events[k].t, first + static_cast<double>(k) * pi / 2, 400 * rtol);
+            }
+        }
+    }
+}
+
 TEST(Bernstein, NotANumberAtTheEndOfAStepEndsTheRun)
 {
     const Timed system{[](double t) { return std::sqrt(0.55 - t); }};

@@ -8,7 +8,7 @@
 namespace ricochet::test::detectors_conformance_test {
 namespace {
 
-Network network()
+BareNetwork network()
 {
     Model model;
     model.system = "host";
@@ -16,7 +16,7 @@ Network network()
     model.offset = {0, 0};
     model.scale = {1, 1};
     model.layers = {{.inputs = 2, .outputs = 1, .weight = {0, 0}, .bias = {1}}};
-    return Network(model);
+    return BareNetwork(model);
 }
 
 template <class Detector>

@@ -30,7 +30,7 @@ GateCase keeping(GateCase gate, Evidence deferred)
 
 std::vector<GateCase> keeping_gates()
 {
-    const auto verified = [](const Model& model) { return Verified<>(Network(model)); };
+    const auto verified = [](const Model& model) { return Verified<>(BareNetwork(model)); };
     const auto foreseen = [](const Model& model) { return Foreseen<>(gates::Gate(model)); };
     const auto certified = [](const Model& model) { return Certified<>(model); };
     // By counts: decisions by a clock differ from run to run.
@@ -60,7 +60,7 @@ GateCase trusted(GateCase gate, Evidence deferred)
 
 std::vector<GateCase> trusted_gates()
 {
-    const auto network = [](const Model& model) { return Network(model); };
+    const auto network = [](const Model& model) { return BareNetwork(model); };
     const auto calibrated = [](const Model& model) { return Calibrated<>(gates::Gate(model)); };
     const auto bounds = [](const Model& model) { return CalibratedBounds<>(gates::Gate(model)); };
     std::vector<GateCase> gates{

@@ -32,7 +32,7 @@ Model linear_model(double weight_u, double weight_v, double bias)
     return model;
 }
 
-Run<std::array<double, 2>> run_with(const Network& network, double step = 0.01)
+Run<std::array<double, 2>> run_with(const BareNetwork& network, double step = 0.01)
 {
     return integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 20.5, .step = step}, FixedStep<Rk4>{},
                      network);
@@ -41,7 +41,7 @@ Run<std::array<double, 2>> run_with(const Network& network, double step = 0.01)
 TEST(Network, FindsThePapersThirteenImpactsAtItsOwnStep)
 {
     const BouncingBall ball;
-    const auto run = run_with(Network(paper_model()));
+    const auto run = run_with(BareNetwork(paper_model()));
     ASSERT_EQ(run.events.size(), 13u);
     for (int i = 0; i < 13; ++i) {
         // The bound that the exact detectors meet too.
@@ -53,7 +53,7 @@ TEST(Network, FindsThePapersThirteenImpactsAtItsOwnStep)
 
 TEST(Network, IsAskedOncePerStepAndSavesTheGuard)
 {
-    const auto run = run_with(Network(paper_model()));
+    const auto run = run_with(BareNetwork(paper_model()));
     EXPECT_EQ(run.statistics.network_calls, run.statistics.steps);
     EXPECT_LT(run.statistics.guard_calls, run.statistics.steps / 5);
 }
@@ -62,7 +62,7 @@ TEST(Network, AFalseAlarmIsCountedAndChangesNothing)
 {
     const auto exact = integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 20.5, .step = 0.01},
                                  FixedStep<Rk4>{}, Ends{});
-    const auto run = run_with(Network(linear_model(0, 0, 1)));  // always "event"
+    const auto run = run_with(BareNetwork(linear_model(0, 0, 1)));  // always "event"
     ASSERT_EQ(run.events.size(), exact.events.size());
     for (std::size_t i = 0; i < run.events.size(); ++i) {
         EXPECT_EQ(run.events[i].t, exact.events[i].t);
@@ -73,7 +73,7 @@ TEST(Network, AFalseAlarmIsCountedAndChangesNothing)
 TEST(Network, AMissedEventIsFoundLateAndMarked)
 {
     // Announces an event only once the ball is already below the floor.
-    const auto run = run_with(Network(linear_model(-1, 0, 0)));
+    const auto run = run_with(BareNetwork(linear_model(-1, 0, 0)));
     ASSERT_GT(run.events.size(), 0u);
     EXPECT_EQ(run.statistics.late_events, run.events.size());
     const auto& first = run.events[0];
@@ -87,7 +87,7 @@ TEST(Network, ANetworkThatNeverSpeaksLetsTheBallFall)
 {
     Model silent = linear_model(0, 0, -1);
     silent.step_min = 0;  // the last step is shorter
-    const auto run = run_with(Network(silent));
+    const auto run = run_with(BareNetwork(silent));
     EXPECT_EQ(run.events.size(), 0u);
     EXPECT_LT(run.x[0], -1000);
     EXPECT_EQ(run.statistics.guard_calls, 1u);  // when it was armed
@@ -95,7 +95,7 @@ TEST(Network, ANetworkThatNeverSpeaksLetsTheBallFall)
 
 TEST(Network, NaNWeightsAnnounceAnEventAtEveryStep)
 {
-    const auto run = run_with(Network(linear_model(std::nan(""), 0, 0)));
+    const auto run = run_with(BareNetwork(linear_model(std::nan(""), 0, 0)));
     EXPECT_EQ(run.events.size(), 13u);
     EXPECT_EQ(run.statistics.evidence.assumed, run.statistics.false_alarms);
 }
@@ -116,7 +116,7 @@ struct KnownRun {
 constexpr KnownRun known_runs[] = {{0.9, 10, 20.5, 13}, {0.7, 1, 2.25, 6}, {0.9, 1, 3, 4}};
 
 template <class Stepping>
-void expect_all_impacts(const KnownRun& known, const Options& options, const Network& network)
+void expect_all_impacts(const KnownRun& known, const Options& options, const BareNetwork& network)
 {
     const BouncingBall ball({.gravity = 9.81, .restitution = known.restitution});
     const auto run = integrate(ball, {known.height, 0.0}, options, Stepping{}, network);
@@ -129,7 +129,7 @@ void expect_all_impacts(const KnownRun& known, const Options& options, const Net
 
 TEST(Network, OneModelServesEveryBallAtEveryFixedStep)
 {
-    const Network network(any_step_model());
+    const BareNetwork network(any_step_model());
     for (const KnownRun& known : known_runs) {
         for (const double h :
              {1e-4, 3e-4, 1e-3, 3.7e-3, 0.01, 0.037, 0.05, 0.1, 0.3, 0.37, 0.7, 1.0}) {
@@ -140,7 +140,7 @@ TEST(Network, OneModelServesEveryBallAtEveryFixedStep)
 
 TEST(Network, OneModelServesEveryBallUnderErrorControl)
 {
-    const Network network(any_step_model());
+    const BareNetwork network(any_step_model());
     for (const KnownRun& known : known_runs) {
         for (const double rtol : {1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12}) {
             const Options options{.t_end = known.t_end, .rtol = rtol, .atol = rtol / 100};
@@ -153,7 +153,7 @@ TEST(Network, OneModelServesEveryBallUnderErrorControl)
 TEST(Network, AStepOutsideItsRangeIsNeverCleared)
 {
     // Trained for 0.01 s only: the last step, 0.004 s, is examined.
-    const Network network(linear_model(0, 0, -1));  // never "event"
+    const BareNetwork network(linear_model(0, 0, -1));  // never "event"
     const auto run = integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 0.104, .step = 0.01},
                                FixedStep<Rk4>{}, network);
     EXPECT_EQ(run.statistics.checks_deferred, 10u);
@@ -163,7 +163,7 @@ TEST(Network, AStepOutsideItsRangeIsNeverCleared)
 std::string refusal(const Model& model, double step = 0.01)
 {
     try {
-        (void)run_with(Network(model), step);
+        (void)run_with(BareNetwork(model), step);
         return "accepted";
     } catch (const std::invalid_argument& reason) {
         return reason.what();
@@ -189,7 +189,7 @@ TEST(Network, AModelForAnotherSystemIsRefused)
         [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
     };
     EXPECT_THROW((void)integrate(Nameless{}, {0.0, 1.0}, {.t_end = 1, .step = 0.01},
-                                 FixedStep<Rk4>{}, Network(paper_model())),
+                                 FixedStep<Rk4>{}, BareNetwork(paper_model())),
                  std::invalid_argument);
 }
 
@@ -197,7 +197,7 @@ TEST(Network, AModelForAnotherGravityIsRefused)
 {
     try {
         (void)integrate(BouncingBall({.gravity = 1.62, .restitution = 0.9}), {10.0, 0.0},
-                        {.t_end = 1, .step = 0.01}, FixedStep<Rk4>{}, Network(paper_model()));
+                        {.t_end = 1, .step = 0.01}, FixedStep<Rk4>{}, BareNetwork(paper_model()));
         FAIL() << "accepted";
     } catch (const std::invalid_argument& reason) {
         EXPECT_STREQ(
@@ -209,7 +209,7 @@ TEST(Network, AModelForAnotherGravityIsRefused)
 TEST(Network, AModelForOneStepIsRefusedUnderErrorControl)
 {
     EXPECT_THROW((void)integrate(BouncingBall(), {10.0, 0.0}, {.t_end = 1},
-                                 ErrorControlled<Dopri5>{}, Network(paper_model())),
+                                 ErrorControlled<Dopri5>{}, BareNetwork(paper_model())),
                  std::invalid_argument);
 }
 
@@ -218,7 +218,7 @@ TEST(Network, OutsideItsDomainNothingIsCleared)
     // The model covers heights up to some 12 m; a ball from 1000 m is examined until
     // it has come down that far, and by then it is too fast.
     const auto run = integrate(BouncingBall(), {1000.0, 0.0}, {.t_end = 14, .step = 0.01},
-                               FixedStep<Rk4>{}, Network(paper_model()));
+                               FixedStep<Rk4>{}, BareNetwork(paper_model()));
     EXPECT_EQ(run.statistics.checks_deferred, 0u);
 }
 

@@ -177,6 +177,30 @@ Room random_room(std::mt19937_64& random, X& start)
     return room;
 }
 
+/// Whether the exact detector loses an event of the room in its long steps; then the planned runs
+/// find it where short steps do.
+bool loses_an_event(const Room& room, const X& start, const Options& options)
+{
+    const auto exact = integrate(room, start, options, Controlled{});
+    const auto planned = integrate(room, start, options, Controlled{}, Planned{});
+    std::size_t k = 0;
+    const std::size_t shared = std::min(exact.events.size(), planned.events.size());
+    while (k < shared && same_bits(exact.events[k].t, planned.events[k].t)) ++k;
+    if (k == planned.events.size()) return false;
+    Options fine = options;
+    fine.h_max = 1e-3;
+    fine.max_steps = 10'000;
+    const auto found = integrate(room, start, fine, Controlled{}).events;
+    EXPECT_GT(found.size(), k);
+    if (k >= found.size()) return true;
+    // The runs have errors of 1e-8 a step, which impacts multiply.
+    EXPECT_NEAR(found[k].t, planned.events[k].t, 1e-5);
+    if (k < exact.events.size()) {
+        EXPECT_GT(exact.events[k].t, planned.events[k].t);
+    }
+    return true;
+}
+
 TEST(Planned, RandomRoomsHaveTheEventsOfTheExactDetector)
 {
     std::mt19937_64 random(20);
@@ -184,6 +208,7 @@ TEST(Planned, RandomRoomsHaveTheEventsOfTheExactDetector)
     std::uint64_t proved = 0;
     std::uint64_t steps = 0;
     std::uint64_t rollbacks = 0;
+    int lost = 0;
     for (int i = 0; i < 1000 && !HasFailure(); ++i) {
         SCOPED_TRACE(i);
         X start;
@@ -191,8 +216,13 @@ TEST(Planned, RandomRoomsHaveTheEventsOfTheExactDetector)
         const double step = i % 3 == 0 ? 0.05 : 0.01;
         const auto fixed =
             expect_planned_same<Fixed>(room, start, {.t_end = 3, .step = step, .max_steps = 200});
-        const auto controlled = expect_planned_same<Controlled>(
-            room, start, {.t_end = 3, .rtol = 1e-8, .h_max = i % 2 ? 0.03 : 10, .max_steps = 200});
+        const Options options{
+            .t_end = 3, .rtol = 1e-8, .h_max = i % 2 ? 0.03 : 10, .max_steps = 200};
+        if (loses_an_event(room, start, options)) {
+            ++lost;
+            continue;
+        }
+        const auto controlled = expect_planned_same<Controlled>(room, start, options);
         for (const PlanRun* run : {&fixed, &controlled}) {
             events += run->statistics.events;
             proved += run->statistics.evidence.proved;
@@ -204,6 +234,9 @@ TEST(Planned, RandomRoomsHaveTheEventsOfTheExactDetector)
     EXPECT_GT(events, 2000u);
     EXPECT_GT(proved, steps * 8 / 10);
     EXPECT_GT(rollbacks, 100u);
+    // Long steps pass some discs, in one room of ten.
+    EXPECT_GT(lost, 0);
+    EXPECT_LT(lost, 200);
 }
 
 TEST(Planned, SamplesAndSolutionAreThoseOfTheExactRun)

@@ -8,7 +8,9 @@
 #include <limits>
 
 #include "random_guards.hpp"
+#include "ricochet/detect/bernstein.hpp"
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
@@ -333,6 +335,82 @@ TEST(ResolvedGuards, AGuardThatIsNotFiniteEndsTheRunWhateverItsSign)
             integrate(NotFinite{beyond}, X1{0}, {.t_end = 10}, ErrorControlled<Dopri5>{}, Ends{});
         EXPECT_EQ(ends.outcome, Outcome::non_finite) << beyond;
     }
+}
+
+/// The time or a number that grows like it, and whether it is outside of a window.
+struct Window {
+    double from = 0;
+    double rate = 1;  ///< of the state; 0: only the time moves
+    void flow(double, const X1&, X1& dxdt) const { dxdt = {rate}; }
+    [[nodiscard]] GuardInfo guard_info() const
+    {
+        return {.crossing = Crossing::either, .resets = false};
+    }
+    [[nodiscard]] bool guard(double t, const X1& x) const
+    {
+        const double at = rate == 0 ? t : x[0];
+        return at < from || at > from + 0.25;
+    }
+};
+struct BoundedWindow : Window {
+    double speed_bound(double, const X1&) const { return 1; }
+};
+
+template <class Detector, class System>
+void expect_window(const System& window)
+{
+    const std::size_t changes = window.from + 0.25 < 1 ? 2 : 1;
+    for (const double step : {0.0, 1.0, 0.5, 0.3}) {
+        const Options options{.t_end = 1, .step = step};
+        const auto run =
+            step == 0 ? integrate(window, X1{0}, options, ErrorControlled<Dopri5>{}, Detector{})
+                      : integrate(window, X1{0}, options, FixedStep<Rk4>{}, Detector{});
+        ASSERT_EQ(run.events.size(), changes) << step;
+        // A guard with bounds is located within 1e-10 of a step.
+        EXPECT_NEAR(run.events[0].t, window.from, 1e-10);
+        if (changes == 2) {
+            EXPECT_NEAR(run.events[1].t, window.from + 0.25, 1e-10);
+        }
+    }
+}
+
+TEST(ResolvedGuards, AWindowOfAQuarterOfTheRunIsFoundByItsSignAlone)
+{
+    for (const double rate : {0.0, 1.0}) {
+        for (double from = 0.003; from < 1; from += 0.01) {
+            SCOPED_TRACE(from);
+            expect_window<Extremum>(Window{from, rate});
+            expect_window<Bernstein>(Window{from, rate});
+            expect_window<Planned<>>(BoundedWindow{{from, rate}});
+        }
+    }
+}
+
+TEST(ResolvedGuards, TheEventToleranceSavesCallsOfBooleanGuards)
+{
+    struct Level {
+        void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
+        [[nodiscard]] bool guard(double, const X1& x) const { return x[0] < 1; }
+        void reset(double, X1& x) const { x[0] = 0; }
+    };
+    const auto calls = [](double tolerance) {
+        const Options options{.t_end = 20.55, .step = 0.1, .event_tolerance = tolerance};
+        const auto run = integrate(Level{}, X1{0}, options, FixedStep<Rk4>{});
+        EXPECT_EQ(run.events.size(), 20u);
+        for (std::size_t k = 0; k < run.events.size(); ++k) {
+            // Every event ends a bracket of the tolerance, and the next level begins there.
+            const double before = k == 0 ? 0 : run.events[k - 1].t;
+            EXPECT_GE(run.events[k].t - before, 1 - 1e-14);
+            EXPECT_LE(run.events[k].t - before, 1 + tolerance + 1e-14);
+        }
+        // Beyond the one at the end and the one inside of every step.
+        return static_cast<double>(run.statistics.guard_calls - 2 * run.statistics.steps) / 20;
+    };
+    // A hundredth of the step is seven halvings. Beside them two values inside are taken again, one
+    // of the condition and one after the reset.
+    EXPECT_LE(calls(1e-3), 11.5);
+    EXPECT_NEAR(calls(1e-6) - calls(1e-3), std::log2(1e3), 1);
+    EXPECT_GT(calls(0), 45);
 }
 
 }  // namespace

@@ -70,9 +70,9 @@ void expect_same(const BallRun& a, const BallRun& b)
 template <class Stepping>
 void expect_unmoved_by(const Model& model, const Options& options = usual)
 {
-    expect_same(run<Stepping>(Verified<Extremum>{Network(model)}, options),
+    expect_same(run<Stepping>(Verified<Extremum>{BareNetwork(model)}, options),
                 run<Stepping>(Extremum{}, options));
-    expect_same(run<Stepping>(Verified<Ends>{Network(model), Ends{}}, options),
+    expect_same(run<Stepping>(Verified<Ends>{BareNetwork(model), Ends{}}, options),
                 run<Stepping>(Ends{}, options));
 }
 
@@ -110,7 +110,7 @@ TEST(Verified, ANetworkThatAlwaysClearsMissesNothing)
     model.threshold = 1;  // the logit is 0
     expect_unmoved_by<FixedStep<Rk4>>(model);
     expect_unmoved_by<ErrorControlled<Dopri5>>(model);
-    const auto verified = run<FixedStep<Rk4>>(Verified<>{Network(model)});
+    const auto verified = run<FixedStep<Rk4>>(Verified<>{BareNetwork(model)});
     EXPECT_EQ(verified.statistics.missed_events, 13u);
     EXPECT_EQ(verified.statistics.late_events, 0u);
     EXPECT_EQ(verified.statistics.false_alarms, 0u);
@@ -121,7 +121,7 @@ TEST(Verified, ANetworkThatNeverClearsOnlyCostsTime)
     Model model = model_of([] { return 0.0; });
     model.threshold = -1;
     expect_unmoved_by<FixedStep<Rk4>>(model);
-    const auto verified = run<FixedStep<Rk4>>(Verified<>{Network(model)});
+    const auto verified = run<FixedStep<Rk4>>(Verified<>{BareNetwork(model)});
     EXPECT_EQ(verified.statistics.missed_events, 0u);
     EXPECT_EQ(verified.statistics.false_alarms + 13, verified.statistics.steps);
 }
@@ -129,7 +129,7 @@ TEST(Verified, ANetworkThatNeverClearsOnlyCostsTime)
 TEST(Verified, WithoutABoundNoCheckIsDeferred)
 {
     const auto verified = run<FixedStep<Rk4>>(
-        Verified<>{Network(load_model(RICOCHET_MODELS "/bouncing-ball.safetensors"))});
+        Verified<>{BareNetwork(load_model(RICOCHET_MODELS "/bouncing-ball.safetensors"))});
     EXPECT_EQ(verified.statistics.checks_deferred, 0u);
     EXPECT_EQ(verified.statistics.network_calls, verified.statistics.steps);
     EXPECT_EQ(verified.statistics.evidence.checked + 13, verified.statistics.steps);

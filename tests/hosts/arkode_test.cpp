@@ -1,6 +1,8 @@
 // Events of ARKODE's steps.
 #include "ricochet/hosts/arkode.hpp"
 
+#include <memory>
+
 #include "hosts/host_cases.hpp"
 #include "hosts/sundials_setup.hpp"
 

@@ -1,4 +1,6 @@
 // Events of CVODE's steps.
+#include <algorithm>
+
 #include "hosts/host_cases.hpp"
 #include "hosts/sundials_setup.hpp"
 

@@ -184,6 +184,12 @@ TEST(Filippov, OffTheSurfaceARunStartsOnItsSide)
     EXPECT_EQ(relay.start_mode(0, std::array{-1e-300}), relay.mode_of(Place::below));
     EXPECT_EQ(relay.start_mode(0, std::array{1e-300}), relay.mode_of(Place::above));
     EXPECT_EQ(relay.start_mode(0, std::array{1e-9}, 1e-8), relay.mode_of(Place::sliding));
+    // Points in braces are of the state that the fields declare.
+    EXPECT_EQ(relay.start_mode(0, {1e-300}), relay.mode_of(Place::above));
+    EXPECT_EQ(relay.start_mode(0, {1e-9}, 1e-8), relay.mode_of(Place::sliding));
+    EXPECT_EQ(relay.shares(relay.mode_of(Place::above), 0, {1}), (std::array{1.0}));
+    EXPECT_EQ(relay.meeting(0, relay.mode_of(Place::sliding), 0, {0}),
+              relay.meeting(0, relay.mode_of(Place::sliding), 0, std::array{0.0}));
 }
 
 TEST(Filippov, TangentFieldsAreRecognisedByTheirBending)

@@ -50,6 +50,8 @@ EVERYDAY(Table)
 EVERYDAY(Cell)
 EVERYDAY(Node)
 EVERYDAY(Edge)
+EVERYDAY(Network)
+EVERYDAY(Bounded)
 
 #undef EVERYDAY
 

@@ -60,7 +60,7 @@ TEST(Allocation, NoneUnderErrorControl)
 
 TEST(Allocation, NoneWithANetwork)
 {
-    const Network network(load_model(RICOCHET_MODELS "/bouncing-ball-step-0.01.safetensors"));
+    const BareNetwork network(load_model(RICOCHET_MODELS "/bouncing-ball-step-0.01.safetensors"));
     const Options options{.t_end = 20.5, .step = 0.01, .record_events = false};
     expect_none<FixedStep<Rk4>>(options, network, Newton{});
 }

@@ -16,7 +16,7 @@
 #include "ricochet/integrate/simulation.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
-namespace ricochet {
+namespace ricochet::driving_test {
 namespace {
 
 using Two = std::array<double, 2>;
@@ -405,4 +405,4 @@ TEST(Driving, ASnapshotLaterThanTheEndSaysSo)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::driving_test

@@ -17,7 +17,7 @@
 #include "ricochet/rosenbrock.hpp"
 #include "ricochet/taylor.hpp"
 
-namespace ricochet {
+namespace ricochet::instants_test {
 namespace {
 
 using One = std::array<double, 1>;
@@ -499,4 +499,4 @@ TEST(Instants, TheFlowOfAModeThatWasLeftIsNotCalledAfterItsReset)
 }
 
 }  // namespace
-}  // namespace ricochet
+}  // namespace ricochet::instants_test

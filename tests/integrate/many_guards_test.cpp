@@ -59,14 +59,16 @@ auto run_from(const std::vector<double>& temperatures, double rtol = 1e-6)
                      {.t_end = 20, .rtol = rtol, .atol = rtol});
 }
 
-TEST(ManyGuards, AnEventTakesAtMostTwoRepeatsOfTheStep)
+TEST(ManyGuards, NearlyEveryEventTakesOneRepeatOfTheStep)
 {
+    // Two where the quartic and the step's own map lie further apart than the motion is straight:
+    // in the long steps from one group of rooms to the next.
     for (const std::size_t rooms : {10U, 100U}) {
         for (const double rtol : {1e-4, 1e-6, 1e-8}) {
             const auto run = run_from(spread(rooms), rtol);
             ASSERT_EQ(run.events.size(), 7 * rooms);  // cooling takes 2.0 s, heating 4.1 s
             EXPECT_LE(static_cast<double>(run.statistics.resteps),
-                      2.0 * static_cast<double>(run.events.size()))
+                      1.25 * static_cast<double>(run.events.size()))
                 << rooms << " rooms, rtol " << rtol;
         }
     }

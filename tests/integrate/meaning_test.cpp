@@ -668,6 +668,42 @@ TEST(Meaning, AResetThatDeclinesOnItsSurfaceIsAskedBeyondIt)
     by_all(machine, Array<1>{1}, {.t_end = 2}, [&](const auto& run, const std::string& label) {
         EXPECT_EQ(run.events.size(), 1U) << label;
         EXPECT_EQ(run.statistics.ineffective_resets, 1U) << label;
+        EXPECT_EQ(run.statistics.declined_guard, 0U) << label;
+        const std::vector<std::string> names{"floor"};
+        EXPECT_EQ(describe(run.statistics, names)
+                      .find("1 resets changed nothing, the last that "
+                            "of floor, which left"),
+                  0U)
+            << describe(run.statistics, names);
+    });
+}
+
+TEST(Meaning, ARelayOfAGuardWithEitherIsCountedAndNamed)
+{
+    // x' = -1 from 1 meets its surface at 1, where the other mode turns it back: no event follows.
+    Machine<Array<1>> machine;
+    machine.info = {.crossing = Crossing::either};
+    machine.f = [](Mode m, double, const auto&, auto& dxdt) { dxdt[0] = m == 0 ? -1 : 1; };
+    machine.g = [](std::size_t, Mode, double, const auto& x) { return x[0]; };
+    machine.r = [](std::size_t, Mode m, double, auto&) -> Mode { return 1 - m; };
+    by_all(machine, Array<1>{1}, {.t_end = 3}, [&](const auto& run, const std::string& label) {
+        ASSERT_EQ(run.events.size(), 1U) << label;
+        EXPECT_NEAR(run.x[0], 2, 1e-14) << label;
+        EXPECT_EQ(run.statistics.either_relays, 1U) << label;
+        EXPECT_EQ(run.statistics.relay_guard, 0U) << label;
+        EXPECT_NE(describe(run.statistics)
+                      .find("the last time at guard 0; give the guard a "
+                            "direction"),
+                  std::string::npos)
+            << describe(run.statistics);
+    });
+    // A crossing that goes on in the other mode, and one after which the same mode goes on.
+    machine.f = [](Mode m, double, const auto&, auto& dxdt) { dxdt[0] = m == 0 ? -1 : -2; };
+    by_all(machine, Array<1>{1}, {.t_end = 3}, [&](const auto& run, const std::string& label) {
+        ASSERT_EQ(run.events.size(), 1U) << label;
+        EXPECT_EQ(run.statistics.either_relays, 0U) << label;
+        EXPECT_EQ(run.statistics.relay_guard, no_guard) << label;
+        EXPECT_EQ(describe(run.statistics), "") << label;
     });
 }
 

@@ -10,6 +10,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "allocations.hpp"
@@ -106,6 +107,18 @@ struct Cubics {
 // guard of degree 1, the values and rates at its ends contain all the information of a value
 // inside: the events are the same to the bit, and most steps take one evaluation of each guard, not
 // two.
+TEST(Monitor, KeepsATemporarySystem)
+{
+    EventMonitor monitor(BouncingBall({.restitution = 0.5}), {0, 0});
+    // The place of the temporary system is used again.
+    const BouncingBall other({.restitution = 0.9});
+    const auto run = drive(other, monitor, X{10, 0}, 2, 0.1);
+    ASSERT_EQ(run.cuts.size(), 1u);
+    EXPECT_DOUBLE_EQ(run.cuts[0].after[1], -0.5 * run.cuts[0].before[1]);
+    EventMonitor moved(std::move(monitor));
+    EXPECT_EQ(drive(other, moved, X{10, 0}, 2, 0.1).cuts.size(), 1u);
+}
+
 TEST(Monitor, CubicStepsKeepTheirEventsWithFewerEvaluations)
 {
     for (const double h : {0.3, 0.1, 0.07, 0.01}) {

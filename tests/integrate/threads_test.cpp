@@ -59,7 +59,7 @@ TEST(Threads, ShareABallAndItsNetworks)
     const BouncingBall ball;
     const std::array<double, 2> start{10, 0};
     const Options options{.t_end = 20};
-    const Network network(load_model(models + "bouncing-ball.safetensors"));
+    const BareNetwork network(load_model(models + "bouncing-ball.safetensors"));
     const Verified<Extremum> verified(network);
     const Classifier classifier(load_model(models + "bouncing-ball.safetensors"));
     expect_the_same_in_eight_threads([&] {

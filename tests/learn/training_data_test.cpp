@@ -1,6 +1,7 @@
 // ricochet-training-data, and the sets that it writes.
 #include "learn/training_data.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
 

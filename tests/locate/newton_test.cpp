@@ -119,7 +119,8 @@ TEST(Newton, TheNoiseOfFloatsEndsTheSearchAndIsStated)
         EXPECT_LE(std::fabs(run.events[0].t - root), run.events[0].error + 1e-6);
         EXPECT_GE(run.events[0].error, 1e-8);
         EXPECT_LE(run.events[0].error, 1e-6);
-        EXPECT_LE(run.statistics.guard_calls, 40u);  // 4 of them for the rates at the ends
+        // 4 of them for the rates at the ends, up to 5 on the polynomial of the step.
+        EXPECT_LE(run.statistics.guard_calls, 45u);
     }
 }
 

@@ -37,6 +37,25 @@ private:
     [[maybe_unused]] double rest = 1;
 };
 
+/// Two guards and two modes, `which` first.
+struct Two : Falling {
+    static constexpr std::size_t guard_count = 2;
+    double guard(std::size_t which, Mode mode, double, const X& x) const
+    {
+        return x[which] + static_cast<double>(mode);
+    }
+    Mode reset(std::size_t, Mode mode, double, X&) const { return mode; }
+    bool enabled(std::size_t which, Mode mode) const { return which == mode; }
+    double speed_bound(std::size_t, Mode, double, const X&) const { return 20; }
+};
+
+/// The same with numbers of another type, whose order cannot be told.
+struct Untold : Falling {
+    static constexpr std::size_t guard_count = 2;
+    double guard(int which, int mode, double, const X& x) const { return x[which] + mode; }
+    Mode reset(int, int mode, double, X&) const { return static_cast<Mode>(mode); }
+};
+
 struct System : Falling {
 // CASE 1: found a member `unilatral`, which nothing reads; rename it to `unilateral`
 #if CASE == 1
@@ -131,7 +150,7 @@ private:
     }
 // CASE 24 alone: found a next_time_event whose parameters or result do not fit
 #elif CASE == 24
-    double next_time_event(double t, const X&) const
+    double next_time_event(const X&, double t) const
     {
         return t + 1;
     }
@@ -148,6 +167,59 @@ private:
     void timed_reset(double, X& x) const
     {
         x[1] = -x[1];
+    }
+#endif
+};
+
+struct Swapped : Two {
+// CASE 33 alone: found a guard that takes the Mode before the number of the guard
+#if CASE == 33
+    double guard(Mode mode, std::size_t which, double, const X& x) const
+    {
+        return x[which] + static_cast<double>(mode);
+    }
+// CASE 34 alone: found a guard_rate that takes the Mode before the number of the guard
+#elif CASE == 34
+    double guard_rate(Mode, std::size_t which, double, const X&, const X& dxdt) const
+    {
+        return dxdt[which];
+    }
+// CASE 35 alone: found a reset that takes the Mode before the number of the guard
+#elif CASE == 35
+    Mode reset(Mode mode, std::size_t, double, X&) const
+    {
+        return mode;
+    }
+// CASE 36 alone: found a rest that takes the Mode before the number of the guard
+#elif CASE == 36
+    Mode rest(Mode mode, std::size_t, double, X&) const
+    {
+        return mode;
+    }
+// CASE 37 alone: found a enabled that takes the Mode before the number of the guard
+#elif CASE == 37
+    bool enabled(Mode mode, std::size_t which) const
+    {
+        return which == mode;
+    }
+// CASE 38 alone: found a enabled that takes the Mode before the number of the guard
+#elif CASE == 38
+    bool enabled(Mode mode, std::size_t which, double, const X&) const
+    {
+        return which == mode;
+    }
+// CASE 39 alone: found a speed_bound that takes the Mode before the number of the guard
+#elif CASE == 39
+    double speed_bound(Mode, std::size_t, double, const X&) const
+    {
+        return 20;
+    }
+// CASE 40 alone: found a guard that takes the Mode before the number of the guard
+#elif CASE == 40
+    template <class S>
+    S guard(Mode, std::size_t which, const S&, const std::array<S, 2>& x) const
+    {
+        return x[which];
     }
 #endif
 };
@@ -184,6 +256,45 @@ int main()
     (void)integrate(Unchecked{}, {}, {.t_end = 1});
     EventMonitor monitor(falling, x0);
     (void)monitor.examine(Step(Instant{0}, 1, x0, x0, x0, x0));
+    (void)integrate(Two{}, x0, {.t_end = 1});
+    (void)integrate(Untold{}, x0, {.t_end = 1});
+    Simulation braced(falling, {10, 0}, {.t_end = 1});
+    Simulation own(Falling{}, {10, 0}, {.t_end = 1}, FixedStep<Rk4>{});
+    EventMonitor braced_monitor(falling, {10, 0});
+#elif CASE >= 33 && CASE <= 40
+    (void)integrate(Swapped{}, x0, {.t_end = 1});
+// CASE 41 alone: found a start with another number of components than System::State
+#elif CASE == 41
+    Simulation simulation(falling, {10, 0, 1}, {.t_end = 1});
+// CASE 42 alone: found a start with another number of components than System::State
+#elif CASE == 42
+    Simulation simulation(Falling{}, {10}, {.t_end = 1}, FixedStep<Rk4>{});
+// CASE 43 alone: found a start with another number of components than System::State
+#elif CASE == 43
+    EventMonitor monitor(falling, {10});
+// CASE 44 alone: found a member `Flow`, which nothing calls; rename it to `flow`
+#elif CASE == 44
+    EventMonitor monitor(OtherFlow{}, x0);
+// CASE 45 alone: found no flow that fits the state
+#elif CASE == 45
+    const struct {
+    } motionless;
+    EventMonitor monitor(motionless, x0);
+// CASE 46 alone: found a start of another type than System::State
+#elif CASE == 46
+    EventMonitor monitor(falling, std::vector<double>{10, 0});
+// CASE 47 alone: found a start that is no state
+#elif CASE == 47
+    EventMonitor monitor(falling, "start");
+// CASE 48 alone: found a start in braces for a system that declares no State
+#elif CASE == 48
+    EventMonitor monitor(Stateless{}, {10, 0});
+// CASE 49 alone: found a start in braces for a system that declares no State
+#elif CASE == 49
+    Simulation simulation(Stateless{}, {10, 0}, {.t_end = 1});
+// CASE 50 alone: found a start of another type than System::State
+#elif CASE == 50
+    Simulation simulation(falling, std::vector<double>{10, 0}, {.t_end = 1});
 #elif CASE == 12
     (void)integrate(OtherFlow{}, x0, {.t_end = 1});
 // CASE 13: found a start with another number of components than System::State

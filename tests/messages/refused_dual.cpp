@@ -6,6 +6,7 @@
 
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/rosenbrock.hpp"
+#include "ricochet/sensitivity/sensitivities.hpp"
 
 using namespace ricochet;
 using X = std::array<double, 2>;
@@ -15,6 +16,8 @@ using X = std::array<double, 2>;
 // CASE 3: found a number wanted of a dual number; expected functions called by their bare names
 // CASE 4: found a number wanted of a dual number; expected functions called by their bare names
 // CASE 5: found a jacobian whose parameters do not fit, or that is not const
+// CASE 6 alone: found a guard_derivative or reset_derivative that takes the Mode before
+// CASE 7 alone: found a guard_derivative or reset_derivative that takes the Mode before
 struct Swinging {
     using State = X;
 #if CASE == 4
@@ -53,9 +56,39 @@ struct Swinging {
     }
 };
 
+/// A ball with written derivatives.
+struct Bouncing {
+    using State = X;
+    static constexpr std::size_t guard_count = 1;
+    void flow(Mode, double, const X& x, X& dxdt) const { dxdt = {x[1], -9.81}; }
+    [[nodiscard]] double guard(std::size_t, Mode, double, const X& x) const { return x[0]; }
+    Mode reset(std::size_t, Mode mode, double, X& x) const
+    {
+        x[1] = -x[1];
+        return mode;
+    }
+#if CASE == 6
+    double guard_derivative(Mode, std::size_t, double, const X&, const X& s) const
+#else
+    double guard_derivative(std::size_t, Mode, double, const X&, const X& s) const
+#endif
+    {
+        return s[0];
+    }
+#if CASE == 7
+    void reset_derivative(Mode, std::size_t, double, const X&, double, X& s) const
+#else
+    void reset_derivative(std::size_t, Mode, double, const X&, double, X& s) const
+#endif
+    {
+        s[1] = -s[1];
+    }
+};
+
 int main()
 {
     const Options options{.t_end = 1};
+    static_cast<void>(sensitivities(Bouncing{}, {1, 0}, {}, options));
     static_cast<void>(integrate(Swinging{}, X{1, 0}, options));
     static_cast<void>(integrate(Swinging{}, X{1, 0}, options, ErrorControlled<Rosenbrock4>{}));
 }

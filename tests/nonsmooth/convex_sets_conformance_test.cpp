@@ -1,6 +1,8 @@
 // Applies the common suite to every convex set.
 #include "conformance/convex_sets.hpp"
 
+#include <algorithm>
+
 namespace ricochet::test::convex_sets_conformance_test {
 namespace {
 

@@ -1,8 +1,10 @@
 // Networks that choose steps: refusals, and steps left to the classical rule.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <string>
 #include <vector>
 

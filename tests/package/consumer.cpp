@@ -57,7 +57,7 @@ bool with_networks()
         return integrate(BouncingBall(), {10.0, 0.0}, options, FixedStep<Rk4>{}, detector)
                    .events.size() == 13;
     };
-    return bounces(Network(model)) && bounces(Verified<>(Network(model)));
+    return bounces(BareNetwork(model)) && bounces(Verified<>(BareNetwork(model)));
 }
 
 }  // namespace

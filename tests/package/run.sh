@@ -45,6 +45,26 @@ if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_P
     exit 1
 fi
 grep -q learn "$work/log"
+
+# configures <options>: what configuring a consumer of the core prints.
+configures() {
+    cmake -G Ninja -S "$source/tests/package" -B "$(mktemp -d "$work/tree.XXXX")" \
+        -DCMAKE_CXX_COMPILER="$last" -DCMAKE_PREFIX_PATH="$work/core" "$@" 2>&1
+}
+configures >"$work/log"  # not into a pipe, which grep -q would break
+grep -q 'ricochet: CMAKE_BUILD_TYPE is empty.*-DCMAKE_BUILD_TYPE=Release' "$work/log"
+for chosen in -DCMAKE_BUILD_TYPE=Release -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS=-O2; do
+    configures "$chosen" >"$work/log"
+    ! grep 'CMAKE_BUILD_TYPE is empty' "$work/log" || exit 1
+done
+echo "an empty build type is named"
+cmp "$source/LICENSE" "$work/core/share/doc/libricochet-dev/copyright"
+for package in libricochet-dev libricochet-c ricochet; do
+    cmp "$source/LICENSE" "$work/whole/share/doc/$package/copyright"
+    cmp "$source/LICENSE-THIRD-PARTY" "$work/whole/share/doc/$package/LICENSE-THIRD-PARTY"
+done
+echo "licences are installed"
+
 for room in learn faults hosts nonsmooth scene sensitivity systems/sliding_mode.hpp; do
     [ -e "$work/whole/include/ricochet/$room" ]
     [ ! -e "$work/core/include/ricochet/$room" ]

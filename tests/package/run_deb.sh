@@ -10,6 +10,10 @@ trap 'rm -rf "$work"' EXIT
 (cd "$build" && cpack -B "$work/debs" >"$work/log" 2>&1) || { cat "$work/log"; exit 1; }
 for package in "$work"/debs/*.deb; do
     dpkg-deb --field "$package" Package Depends
+    for licence in copyright LICENSE-THIRD-PARTY; do
+        [ -n "$(dpkg-deb --fsys-tarfile "$package" |
+            tar -xO "./usr/share/doc/$(dpkg-deb --field "$package" Package)/$licence")" ]
+    done
     dpkg-deb --fsys-tarfile "$package" | tar -t | grep -v '/$' >>"$work/files"
     dpkg-deb --extract "$package" "$work/root"
 done

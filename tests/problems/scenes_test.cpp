@@ -387,8 +387,8 @@ TEST(LeastEigenvalue, TheSlowFormHasTheSameValuesAndTakesItsTime)
               std::string::npos);
 }
 
-/// Runs with a check at every step and planned: the same events, bit for bit. Returns the ratio of
-/// their exact calls.
+/// Runs with a check at every step and planned: the same events, bit for bit, up to the first dip
+/// inside a step that only the bounds show. Returns the ratio of their exact calls.
 template <class Stepping, class System>
 double saved_by_planning(const System& system, const Options& options)
 {
@@ -397,14 +397,20 @@ double saved_by_planning(const System& system, const Options& options)
         integrate(system, system.start(), options, Stepping{}, Planned<>({.check_bounds = false}));
     EXPECT_EQ(every.outcome, Outcome::reached_end);
     EXPECT_EQ(planned.outcome, every.outcome);
-    EXPECT_EQ(planned.events.size(), every.events.size());
+    EXPECT_EQ(planned.statistics.unmet_conditions, 0U);
     EXPECT_GT(every.events.size(), 0U);
     for (std::size_t i = 0; i < std::min(planned.events.size(), every.events.size()); ++i) {
+        if (planned.events[i].t < every.events[i].t) {
+            EXPECT_GT(i, 10U);  // the motion is another one from here on
+            return static_cast<double>(every.statistics.guard_calls) /
+                   static_cast<double>(planned.statistics.guard_calls);
+        }
         EXPECT_EQ(planned.events[i].t, every.events[i].t);
         EXPECT_EQ(planned.events[i].guard, every.events[i].guard);
         EXPECT_EQ(planned.events[i].before, every.events[i].before);
         EXPECT_EQ(planned.events[i].after, every.events[i].after);
     }
+    EXPECT_EQ(planned.events.size(), every.events.size());
     EXPECT_EQ(planned.x, every.x);
     return static_cast<double>(every.statistics.guard_calls) /
            static_cast<double>(planned.statistics.guard_calls);

@@ -377,7 +377,16 @@ def test_pictures(tmp_path):
     # The flight after the first impact, which is one step: up to r^2 of the height.
     first, second = run.events["t"][:2]
     assert abs(np.nanmax(height[(t > first) & (t < second)]) - 0.25) < 0.01
-    ricochet.plot(run, phase=(0, 1), ax=pyplot.subplots()[1])
+    plane = ricochet.plot(run, phase=(1, 0), ax=pyplot.subplots()[1])
+    assert (plane.get_xlabel(), plane.get_ylabel()) == ("x[1]", "x[0]")
+    # Labels are those of the components, also in a plane and where one is drawn alone.
+    plane = ricochet.plot(run, phase=(1, 0), labels=["height", "velocity"], ax=pyplot.subplots()[1])
+    assert (plane.get_xlabel(), plane.get_ylabel()) == ("velocity", "height")
+    alone = ricochet.plot(run, [1], labels=["velocity"], ax=pyplot.subplots()[1])
+    assert (alone.get_xlabel(), alone.get_ylabel()) == ("t", "velocity")
+    assert ax.get_ylabel() == "" and ax.get_legend() is not None
+    with pytest.raises(ValueError, match="labels: found 1, expected one for each of 2"):
+        ricochet.plot(run, phase=(0, 1), labels=["height"])
     pyplot.close("all")
     with pytest.raises(ValueError, match="without states"):
         ricochet.plot(ricochet.integrate(Ball(), [1.0, 0.0], 2.0))

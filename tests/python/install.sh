@@ -10,7 +10,7 @@ trap 'rm -rf "$work"' EXIT
 # A copy, so that nothing is left in the source tree.
 mkdir "$work/source"
 cd "$source"
-cp -r CMakeLists.txt LICENSE cmake docs include models pyproject.toml python setup.py src "$work/source"
+cp -r CMakeLists.txt LICENSE LICENSE-THIRD-PARTY cmake docs include models pyproject.toml python setup.py src "$work/source"
 "$python" -m pip install --no-build-isolation --no-index --no-deps --target "$work/site" "$work/source"
 cd "$work"
 PYTHONPATH="$work/site" MPLBACKEND=Agg "$python" "$source/tests/python/run.py" \
@@ -19,4 +19,6 @@ PYTHONPATH="$work/site" MPLBACKEND=Agg "$python" "$source/tests/python/run.py" \
 import sys
 sys.path.insert(0, '$work/site')
 import importlib.metadata
-assert importlib.metadata.version('ricochet') == '0.1.0'"
+assert importlib.metadata.version('ricochet') == '0.1.0'
+licences = {f.name for f in importlib.metadata.files('ricochet')}
+assert {'LICENSE', 'LICENSE-THIRD-PARTY'} <= licences, licences"

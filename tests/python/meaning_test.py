@@ -134,4 +134,18 @@ def test_a_reset_that_declines_is_counted():
         run = ricochet.integrate(wall, [1.0], 2.0)
         assert len(run.events) == 1 and run.mode == acts
         assert run.statistics.ineffective_resets == (not acts)
+        assert run.statistics.declined_guard == (None if acts else 0)
+        assert ("left the state and the mode" in run.message) is not acts
         assert run.statistics.unmet_conditions == 0
+
+
+@pytest.mark.parametrize("options", [{}, {"method": "rk4", "fixed": True, "step": 0.3},
+                                     {"method": "rk4", "fixed": True, "step": 0.1}])
+def test_a_dip_within_a_true_bound_is_found(options):
+    dip = ricochet.Guard(lambda t, x: min(1.0, 50 * abs(x[0] - 0.37) - 1e-3),
+                         speed_bound=lambda t, x: 50.0)
+    run = ricochet.integrate(ricochet.System(lambda t, x: [1.0], [dip]), [0.0], 1.0,
+                             detector="planned", **options)
+    assert len(run.events) == 1
+    assert abs(run.events["t"][0] - 0.36998) < 1e-9
+    assert run.statistics.unresolved_steps == 0

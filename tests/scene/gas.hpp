@@ -1,6 +1,7 @@
 // Discs at random in a box.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>

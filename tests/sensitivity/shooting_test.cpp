@@ -55,6 +55,9 @@ TEST(Shooting, TheOrbitOfALinearOscillatorTakesOneCorrection)
     EXPECT_NEAR(std::abs(orbit.multipliers[0] - expected) *
                     std::abs(orbit.multipliers[0] - std::conj(expected)),
                 0, 1e-11);
+    EXPECT_EQ(floquet_multipliers(orbit.monodromy), orbit.multipliers);
+    const Eigen::MatrixXd unknown = Eigen::MatrixXd::Constant(2, 2, std::nan(""));
+    EXPECT_TRUE(floquet_multipliers(unknown).hasNaN());
     EXPECT_EQ(orbit.period, pi);
     EXPECT_EQ(orbit.run.outcome, Outcome::reached_end);
 }

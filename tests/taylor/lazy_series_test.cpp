@@ -9,6 +9,7 @@
 #include <numbers>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ricochet/integrate/integrate.hpp"
@@ -241,6 +242,68 @@ TEST(LazySeries, AResetMayChangeTheSizeOfTheState)
     EXPECT_NEAR(run.events[1].t, 3 * pi / 2, 1e-14 * 4);
     ASSERT_EQ(run.x.size(), 2U);
     EXPECT_NEAR(run.x[0], std::fabs(std::cos(5.0)), 1e-13);
+}
+
+/// A weight that falls and hangs by a spring in turn: the spring adds its length, and each mode has
+/// a guard of its own. Functions are called with the state of their mode alone.
+struct Hanging {
+    using State = Vector;
+    enum : Mode { falls, hangs };
+    static constexpr bool changes_dimension = true;
+    static constexpr std::size_t mode_count = 2;
+    static constexpr std::size_t guard_count = 2;
+
+    static void expect(std::size_t found, Mode mode)
+    {
+        if (found != (mode == falls ? 1U : 2U)) throw std::logic_error("the state of another mode");
+    }
+    template <class S>
+    void flow(Mode mode, const S& /*t*/, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        expect(x.size(), mode);
+        expect(dxdt.size(), mode);
+        if (mode == falls) {
+            dxdt[0] = -1.0;
+        } else {
+            dxdt[0] = x[1];
+            dxdt[1] = -x[0];
+        }
+    }
+    [[nodiscard]] static bool enabled(std::size_t which, Mode mode) { return which == mode; }
+    template <class S>
+    [[nodiscard]] S guard(std::size_t which, Mode mode, const S& /*t*/,
+                          const std::vector<S>& x) const
+    {
+        expect(x.size(), mode);
+        return which == falls ? x[0] : -x[0];
+    }
+    Mode reset(std::size_t /*which*/, Mode mode, double /*t*/, Vector& x) const
+    {
+        expect(x.size(), mode);
+        x = mode == falls ? Vector{0, -1} : Vector{1};
+        return mode == falls ? hangs : falls;
+    }
+};
+
+TEST(LazySeries, AModeIsRecordedWithItsOwnSizeWhenItIsEntered)
+{
+    // Falls from 1 to 0 in 1, then -sin until it is back at 0 after pi.
+    for (const auto& [start, mode] :
+         {std::pair(Vector{1}, Hanging::falls), std::pair(Vector{0, -1}, Hanging::hangs)}) {
+        const auto run =
+            integrate(Hanging{}, start, {.t_end = 10, .mode = mode, .rtol = 1e-14, .atol = 1e-14},
+                      ByTaylor{});
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
+        double t = 0;
+        Mode at = mode;
+        for (const auto& event : run.events) {
+            t += at == Hanging::falls ? 1 : pi;
+            at = at == Hanging::falls ? Hanging::hangs : Hanging::falls;
+            EXPECT_NEAR(event.t, t, 4e-14);
+        }
+        EXPECT_EQ(run.events.size(), mode == Hanging::falls ? 5U : 4U);
+        EXPECT_EQ(run.x.size(), at == Hanging::falls ? 1U : 2U);
+    }
 }
 
 /// Gears whose number is known at run time.

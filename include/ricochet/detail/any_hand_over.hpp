@@ -3,6 +3,7 @@
 // The loop of a hand-over for N components and M reactions, for systems of any type.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <type_traits>
 #include <utility>

@@ -9,7 +9,7 @@
 
 namespace ricochet {
 
-/// Predicts as `Network` does, with the same remedies for its mistakes, from
+/// Predicts as `BareNetwork` does, with the same remedies for its mistakes, from
 ///
 ///     g + g' h + g'' h^2 / 2 <= 0   iff the guard is on or below its surface after h,
 ///

@@ -62,8 +62,14 @@ template <class X, class Function>
 [[gnu::always_inline]] inline void for_each_component(const X& x, const Function& function)
 {
     using Index = decltype(x.size());
-    if constexpr (is_small<X>) {
-        for_each_index<fixed_size<X>(), Index>(function);
+    constexpr std::size_t fixed = fixed_size<X>();
+    if constexpr (is_small<X> && fixed <= 4) {  // an index sequence takes three functions a loop
+        function(Index{0});
+        if constexpr (fixed > 1) function(Index{1});
+        if constexpr (fixed > 2) function(Index{2});
+        if constexpr (fixed > 3) function(Index{3});
+    } else if constexpr (is_small<X>) {
+        for_each_index<fixed, Index>(function);
     } else {
         const Index n = x.size();
         // No component depends on another: the output does not overlap the input with a shift.

@@ -4,11 +4,11 @@
 #pragma once
 
 #include <array>
-#include <memory>
 #include <vector>
 
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/meter.hpp"
+#include "ricochet/detail/owner.hpp"
 #include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/detail/system_table.hpp"
@@ -26,6 +26,7 @@ struct RunSetup {
     QuietKernel<X> quiet = nullptr;  ///< with flow and guard inlined; may be null
     bool quiet_on_series = false;    ///< it clears guards by their power series
     bool error_controlled = true;
+    bool cancels_by_itself = false;  ///< `Options::cancelled` is not the caller's
     bool method_by_name = false;
     int order = 0;              ///< order chosen for the method, if it has a choice
     const char* stepping = "";  ///< type of the stepping, as the compiler writes it
@@ -77,11 +78,16 @@ public:
 
 /// Keeps a copy of `setup`. @throws std::invalid_argument as `Simulation` does
 template <class X>
-[[nodiscard]] std::unique_ptr<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
-                                                    const Options& options);
+[[nodiscard]] Owner<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
+                                          const Options& options);
 
 /// Computes a whole run, with the loop on the stack.
 template <class X>
 [[nodiscard]] Run<X> run_whole(const RunSetup<X>& setup, const X& x0, const Options& options);
+
+/// The same, with the result shown to `take` where it is, and not moved.
+template <class X>
+void run_whole(const RunSetup<X>& setup, const X& x0, const Options& options,
+               void (*take)(void* out, const Run<X>& run), void* out);
 
 }  // namespace ricochet::detail

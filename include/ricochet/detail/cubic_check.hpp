@@ -9,10 +9,10 @@
 // (detail/resolved_parts.hpp).
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/guard_view.hpp"
 
 namespace ricochet::detail {
@@ -67,7 +67,7 @@ struct CubicCheck {
     /// on the surface.
     [[nodiscard]] double lowest(double sign) const noexcept
     {
-        return std::min(std::min(sign * b1, sign * b2), sign * v1);
+        return least_of(least_of(sign * b1, sign * b2), sign * v1);
     }
 
     /// Whether a guard that deviates by `e` inside keeps the sign of its end throughout, apart
@@ -83,7 +83,8 @@ struct CubicCheck {
     /// The largest control point.
     [[nodiscard]] double size() const noexcept
     {
-        return std::max({std::fabs(v0), std::fabs(b1), std::fabs(b2), std::fabs(v1)});
+        return greatest_of(greatest_of(std::fabs(v0), std::fabs(b1)),
+                           greatest_of(std::fabs(b2), std::fabs(v1)));
     }
 };
 

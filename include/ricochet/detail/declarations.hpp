@@ -18,6 +18,7 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <type_traits>
 
 #include "ricochet/hybrid/guard.hpp"
@@ -31,6 +32,7 @@ enum class Declaration : std::uint8_t {
     fits,
     not_const,            ///< fits no call on a const system, perhaps one on another
     does_not_fit,         ///< has other parameters or another result
+    mode_before_which,    ///< takes a Mode and then `which`, in this order only
     mode_for_which,       ///< has `guard_count` and modes, and takes a Mode in place of `which`
     which_without_count,  ///< takes `which`, but there is no guard_count
     by_value,             ///< changes a copy
@@ -47,7 +49,8 @@ struct Anything {
 /// Becomes a T and nothing that a T converts to.
 template <class T>
 struct Only {
-    template <class U> requires std::same_as<U, T>
+    template <class U>
+    requires std::same_as<U, T>
     operator U() const;
 };
 
@@ -55,17 +58,21 @@ struct Only {
 /// here has it twice, and a pointer to it is ambiguous.
 struct Names {
     int flow, guard, guards, guard_rate, guard_rates, guard_info, guard_count, reset, rest, enabled;
-    int next_time_event, previous_time_event, time_reset, mode_count, crossing, unilateral;
+    int next_time_event, previous_time_event, time_reset, time_events, mode_count, crossing,
+        unilateral;
     // The names of inclusions, see inclusion_declarations.hpp.
-    int smooth, smooth_jacobian, mass, observe, act, offset, offset_rate, branch_bound, bound_gradient;
+    int smooth, smooth_jacobian, mass, observe, act, offset, offset_rate, branch_bound,
+        bound_gradient;
     int confines, affine;
 };
 
 template <class System, bool final = std::is_final_v<System>>
-struct NamesTwice : System, Names {};
+struct NamesTwice : System, Names {
+};
 
 template <class System>
-struct NamesTwice<System, true> : Names {};
+struct NamesTwice<System, true> : Names {
+};
 
 /// The same for names that are likely misspellings.
 struct NearNames {
@@ -77,17 +84,20 @@ struct NearNames {
 };
 
 template <class System, bool final = std::is_final_v<System>>
-struct NearNamesTwice : System, NearNames {};
+struct NearNamesTwice : System, NearNames {
+};
 
 template <class System>
-struct NearNamesTwice<System, true> : NearNames {};
+struct NearNamesTwice<System, true> : NearNames {
+};
 
 /// None of those names is in use.
-template <class System>
+/// @tparam Twice  `NearNamesTwice` of a system
+template <class Twice>
 concept SpeltWell = requires
 {
-#define RICOCHET_FUNCTION(wrong, right) &NearNamesTwice<System>::wrong;
-#define RICOCHET_VALUE(wrong, right) &NearNamesTwice<System>::wrong;
+#define RICOCHET_FUNCTION(wrong, right) &Twice::wrong;
+#define RICOCHET_VALUE(wrong, right) &Twice::wrong;
 #include "ricochet/detail/misspellings.inc"
 #undef RICOCHET_FUNCTION
 #undef RICOCHET_VALUE
@@ -95,27 +105,38 @@ concept SpeltWell = requires
 
 // Tests of one name: whether a class has a member of it, how it can be
 // called, whether it has an address, whether it is a number or another value.
-#define RICOCHET_NAME(name)                                                                   \
-    struct Name_##name {                                                                      \
-        template <class System>                                                               \
-        static constexpr bool named = std::is_final_v<System> ||                              \
-                                      !requires { &NamesTwice<System>::name; };               \
-        template <class System, class... Arguments>                                           \
-        static constexpr bool takes = requires(System& system, Arguments... arguments) {      \
-            system.name(static_cast<Arguments>(arguments)...);                                \
-        };                                                                                    \
-        template <class System>                                                               \
-        static constexpr bool addressable = requires { &System::name; };                      \
-        template <class System>                                                               \
-        static constexpr bool type = requires { typename System::name; };                     \
-        template <class System>                                                               \
-        static constexpr bool number = requires(const System& system) {                       \
-            requires std::is_arithmetic_v<std::remove_cvref_t<decltype(system.name)>>;        \
-        };                                                                                    \
-        template <class System>                                                               \
-        static constexpr bool value = requires(const System& system) {                        \
-            requires !std::is_function_v<std::remove_reference_t<decltype((system.name))>>;   \
-        };                                                                                    \
+#define RICOCHET_NAME(name)                                                                 \
+    struct Name_##name {                                                                    \
+        template <class System>                                                             \
+        static constexpr bool named = std::is_final_v<System> || !requires                  \
+        {                                                                                   \
+            &NamesTwice<System>::name;                                                      \
+        };                                                                                  \
+        template <class System, class... Arguments>                                         \
+        static constexpr bool takes = requires(System & system, Arguments... arguments)     \
+        {                                                                                   \
+            system.name(static_cast<Arguments>(arguments)...);                              \
+        };                                                                                  \
+        template <class System>                                                             \
+        static constexpr bool addressable = requires                                        \
+        {                                                                                   \
+            &System::name;                                                                  \
+        };                                                                                  \
+        template <class System>                                                             \
+        static constexpr bool type = requires                                               \
+        {                                                                                   \
+            typename System::name;                                                          \
+        };                                                                                  \
+        template <class System>                                                             \
+        static constexpr bool number = requires(const System& system)                       \
+        {                                                                                   \
+            requires std::is_arithmetic_v<std::remove_cvref_t<decltype(system.name)>>;      \
+        };                                                                                  \
+        template <class System>                                                             \
+        static constexpr bool value = requires(const System& system)                        \
+        {                                                                                   \
+            requires !std::is_function_v<std::remove_reference_t<decltype((system.name))>>; \
+        };                                                                                  \
     };
 RICOCHET_NAME(flow)
 RICOCHET_NAME(guard)
@@ -130,6 +151,7 @@ RICOCHET_NAME(enabled)
 RICOCHET_NAME(next_time_event)
 RICOCHET_NAME(previous_time_event)
 RICOCHET_NAME(time_reset)
+RICOCHET_NAME(time_events)
 RICOCHET_NAME(mode_count)
 RICOCHET_NAME(crossing)
 RICOCHET_NAME(unilateral)
@@ -149,8 +171,7 @@ RICOCHET_NAME(affine)
 /// Callable with these, after up to four and before up to one argument of any type.
 template <class Name, class System, class... Middle>
 concept CallableAround =
-    Name::template takes<System, Middle...> ||
-    Name::template takes<System, Anything, Middle...> ||
+    Name::template takes<System, Middle...> || Name::template takes<System, Anything, Middle...> ||
     Name::template takes<System, Anything, Anything, Middle...> ||
     Name::template takes<System, Anything, Anything, Anything, Middle...> ||
     Name::template takes<System, Anything, Anything, Anything, Anything, Middle...> ||
@@ -161,16 +182,15 @@ concept CallableAround =
 
 /// Callable with a time of the scalar type of the state, as templates over that type are.
 template <class Name, class System, class... States>
-concept CallableWithTime =
-    Name::template takes<System, double, States...> ||
-    Name::template takes<System, Anything, double, States...> ||
-    Name::template takes<System, Anything, Anything, double, States...>;
+concept CallableWithTime = Name::template takes<System, double, States...> ||
+                           Name::template takes<System, Anything, double, States...> ||
+                           Name::template takes<System, Anything, Anything, double, States...>;
 
 /// Callable in some way. States are passed as such, and arguments of any type only as a last
 /// resort, so that templates of a state are not tried with something that is no state.
 template <class Name, class System, class X>
-concept CallableSomehow =
-    CallableAround<Name, System, X&, X&> || CallableAround<Name, System, X&> || CallableAround<Name, System> ||
+concept CallableSomehow = CallableAround<Name, System, X&, X&> ||
+    CallableAround<Name, System, X&> || CallableAround<Name, System> ||
     CallableWithTime<Name, System, X&, X&> || CallableWithTime<Name, System, X&>;
 
 /// The reason why a function fits no form.
@@ -194,7 +214,8 @@ template <class Name, class System, class X>
 template <class Name, class System, class X>
 [[nodiscard]] constexpr bool is_hidden() noexcept
 {
-    if constexpr (std::is_final_v<System> || !Name::template named<System> || Name::template type<System>) {
+    if constexpr (std::is_final_v<System> || !Name::template named<System> ||
+                  Name::template type<System>) {
         return false;
     } else {
         return !CallableSomehow<Name, System, X> && !Name::template addressable<System> &&
@@ -205,19 +226,28 @@ template <class Name, class System, class X>
 /// Takes a Mode, and only a Mode, in place of the number of a guard.
 template <class Name, class System, class... Rest>
 concept TakesOnlyMode = Name::template takes<const System, Only<Mode>, Rest...> &&
-    !Name::template takes<const System, Only<std::size_t>, Rest...>;
+                        !Name::template takes<const System, Only<std::size_t>, Rest...>;
 
 /// Takes the number of a guard, and only that, in place of a Mode.
 template <class Name, class System, class... Rest>
 concept TakesOnlyWhich = !Name::template takes<const System, Only<Mode>, Rest...> &&
-    Name::template takes<const System, Only<std::size_t>, Rest...>;
+                         Name::template takes<const System, Only<std::size_t>, Rest...>;
+
+/// Takes a Mode and then the number of a guard, and not in the right order.
+template <class Name, class System, class... Rest>
+concept TakesModeBeforeWhich =
+    CountsGuards<System> &&
+    !Name::template takes<const System, Only<std::size_t>, Only<Mode>, Rest...> &&
+    Name::template takes<const System, Only<Mode>, Only<std::size_t>, Rest...>;
 
 /// A mode and the number of a guard convert into each other, so either can be taken for the
 /// other. `counted` and `moded` state the form in which the function is used.
 template <class Name, class System, class X, bool counted, bool moded, class... Rest>
 [[nodiscard]] constexpr Declaration told_apart() noexcept
 {
-    if constexpr (counted) {
+    if constexpr (TakesModeBeforeWhich<Name, System, Rest...>) {
+        return Declaration::mode_before_which;
+    } else if constexpr (counted) {
         if constexpr (Moded<System, X> && TakesOnlyMode<Name, System, Rest...>) {
             return Declaration::mode_for_which;
         }
@@ -237,7 +267,8 @@ template <class System, class X>
     if constexpr (!Flowing<System, X>) {
         return unfit<Name_flow, System, X>();
     } else if constexpr (Name_flow::addressable<System> &&
-                         (Name_flow::takes<const System, double, const X&, X> || Name_flow::takes<const System, Mode, double, const X&, X>)) {
+                         (Name_flow::takes<const System, double, const X&, X> ||
+                          Name_flow::takes<const System, Mode, double, const X&, X>)) {
         return Declaration::by_value;
     } else {
         return Declaration::fits;
@@ -250,8 +281,9 @@ template <class System, class X>
     if constexpr (!GuardAlone<System, X>) {
         return unfit<Name_guard, System, X>();
     } else {
-        return told_apart<Name_guard, System, X, PlainGuardOf<System, X> && !ModedGuardOf<System, X>,
-                          ModedSingleGuard<System, X>, double, const X&>();
+        return told_apart < Name_guard, System, X,
+               PlainGuardOf<System, X> && !ModedGuardOf<System, X>, ModedSingleGuard<System, X>,
+               double, const X& > ();
     }
 }
 
@@ -271,8 +303,9 @@ template <class System, class X>
     if constexpr (!RateAlone<System, X>) {
         return unfit<Name_guard_rate, System, X>();
     } else {
-        return told_apart<Name_guard_rate, System, X, PlainRateOf<System, X, X> && !ModedRateOf<System, X, X>,
-                          ModedSingleRate<System, X, X>, double, const X&, const X&>();
+        return told_apart < Name_guard_rate, System, X,
+               PlainRateOf<System, X, X> && !ModedRateOf<System, X, X>,
+               ModedSingleRate<System, X, X>, double, const X&, const X& > ();
     }
 }
 
@@ -300,7 +333,8 @@ template <class System, class X>
 template <class Name, class System, class X>
 [[nodiscard]] constexpr bool is_refused(Declaration found) noexcept
 {
-    return (found != Declaration::absent && found != Declaration::fits) || is_hidden<Name, System, X>();
+    return (found != Declaration::absent && found != Declaration::fits) ||
+           is_hidden<Name, System, X>();
 }
 
 template <class System, class X>
@@ -317,18 +351,25 @@ template <class System, class X>
         return Declaration::absent;
     } else if constexpr (!Resetting<System, X>) {
         return unfit<Name_reset, System, X>();
-    } else if constexpr ((PlainSingleReset<System, X> && Name_reset::takes<const System, double, X>) ||
-                         (PlainResetOf<System, X> && Name_reset::takes<const System, std::size_t, double, X>) ||
-                         (ModedSingleReset<System, X> && Name_reset::takes<const System, Mode, double, X>) ||
-                         (ModedResetOf<System, X> && Name_reset::takes<const System, std::size_t, Mode, double, X>) ||
-                         (PlainSetReset<System, X> && Name_reset::takes<const System, const FiredGuards&, double, X>) ||
-                         (ModedSetReset<System, X> && Name_reset::takes<const System, const FiredGuards&, Mode, double, X>)) {
+    } else if constexpr ((PlainSingleReset<System, X> &&
+                          Name_reset::takes<const System, double, X>) ||
+                         (PlainResetOf<System, X> &&
+                          Name_reset::takes<const System, std::size_t, double, X>) ||
+                         (ModedSingleReset<System, X> &&
+                          Name_reset::takes<const System, Mode, double, X>) ||
+                         (ModedResetOf<System, X> &&
+                          Name_reset::takes<const System, std::size_t, Mode, double, X>) ||
+                         (PlainSetReset<System, X> &&
+                          Name_reset::takes<const System, const FiredGuards&, double, X>) ||
+                         (ModedSetReset<System, X> &&
+                          Name_reset::takes<const System, const FiredGuards&, Mode, double, X>)) {
         return Declaration::by_value;
     } else if constexpr (ResetsTogether<System, X>) {
         return Declaration::fits;
     } else {
-        return told_apart<Name_reset, System, X, PlainResetOf<System, X> && !ModedResetOf<System, X>,
-                          ModedSingleReset<System, X>, double, X&>();
+        return told_apart < Name_reset, System, X,
+               PlainResetOf<System, X> && !ModedResetOf<System, X>, ModedSingleReset<System, X>,
+               double, X& > ();
     }
 }
 
@@ -336,20 +377,25 @@ template <class System, class X>
 template <class System, class X>
 [[nodiscard]] constexpr Declaration rest_declaration() noexcept
 {
-    if constexpr (refuses_guards<System, X>() || is_refused<Name_reset, System, X>(reset_declaration<System, X>())) {
+    if constexpr (refuses_guards<System, X>() ||
+                  is_refused<Name_reset, System, X>(reset_declaration<System, X>())) {
         return Declaration::absent;
     } else if constexpr (!Resting<System, X>) {
         return unfit<Name_rest, System, X>();
-    } else if constexpr ((PlainSingleRest<System, X> && Name_rest::takes<const System, double, X>) ||
-                         (PlainRestOf<System, X> && Name_rest::takes<const System, std::size_t, double, X>) ||
-                         (ModedSingleRest<System, X> && Name_rest::takes<const System, Mode, double, X>) ||
-                         (ModedRestOf<System, X> && Name_rest::takes<const System, std::size_t, Mode, double, X>)) {
+    } else if constexpr ((PlainSingleRest<System, X> &&
+                          Name_rest::takes<const System, double, X>) ||
+                         (PlainRestOf<System, X> &&
+                          Name_rest::takes<const System, std::size_t, double, X>) ||
+                         (ModedSingleRest<System, X> &&
+                          Name_rest::takes<const System, Mode, double, X>) ||
+                         (ModedRestOf<System, X> &&
+                          Name_rest::takes<const System, std::size_t, Mode, double, X>)) {
         return Declaration::by_value;
     } else if constexpr (!Resetting<System, X>) {
         return Declaration::does_not_fit;
     } else {
-        return told_apart<Name_rest, System, X, PlainRestOf<System, X> && !ModedRestOf<System, X>,
-                          ModedSingleRest<System, X>, double, X&>();
+        return told_apart < Name_rest, System, X, PlainRestOf<System, X> && !ModedRestOf<System, X>,
+               ModedSingleRest<System, X>, double, X& > ();
     }
 }
 
@@ -361,9 +407,15 @@ template <class System, class X>
     } else if constexpr (!EnabledIn<System> && !EnabledAt<System, X>) {
         if constexpr (Name_enabled::number<System>) return Declaration::does_not_fit;
         return unfit<Name_enabled, System, X>();
+    } else if constexpr (EnabledIn<System> && TakesModeBeforeWhich<Name_enabled, System>) {
+        return Declaration::mode_before_which;
     } else if constexpr (CountsGuards<System> && EnabledAt<System, X>) {
-        return told_apart<Name_enabled, System, X, !requires(const System& system, std::size_t which, Mode mode, double t, const X& x) { system.enabled(which, mode, t, x); },
-                          false, double, const X&>();
+        return told_apart < Name_enabled, System, X,
+               !requires(const System& system, std::size_t which, Mode mode, double t, const X& x)
+        {
+            system.enabled(which, mode, t, x);
+        }
+        , false, double, const X& > ();
     } else {
         return Declaration::fits;
     }
@@ -372,37 +424,10 @@ template <class System, class X>
 template <class System, class X>
 [[nodiscard]] constexpr Declaration next_time_event_declaration() noexcept
 {
-    if constexpr (Timed<System>) {
+    if constexpr (TimedByFunction<System> || TimedByState<System, X>) {
         return Declaration::fits;
     } else {
         return unfit<Name_next_time_event, System, X>();
-    }
-}
-
-template <class System, class X>
-[[nodiscard]] constexpr Declaration previous_time_event_declaration() noexcept
-{
-    if constexpr (TimedBackward<System>) {
-        return Declaration::fits;
-    } else {
-        return unfit<Name_previous_time_event, System, X>();
-    }
-}
-
-/// Without next_time_event the function would never be called, and does not fit.
-template <class System, class X>
-[[nodiscard]] constexpr Declaration time_reset_declaration() noexcept
-{
-    if constexpr (is_refused<Name_next_time_event, System, X>(next_time_event_declaration<System, X>())) {
-        return Declaration::absent;
-    } else if constexpr (!TimeResetting<System, X>) {
-        return unfit<Name_time_reset, System, X>();
-    } else if constexpr (!Timed<System>) {
-        return Declaration::does_not_fit;
-    } else if constexpr (Name_time_reset::takes<const System, double, X> || Name_time_reset::takes<const System, Mode, double, X>) {
-        return Declaration::by_value;
-    } else {
-        return Declaration::fits;
     }
 }
 
@@ -422,6 +447,49 @@ template <class Name, class System, bool fits>
     }
 }
 
+/// A value of the name that is no `Times` is refused where nothing else says when events happen.
+template <class System, class X>
+[[nodiscard]] constexpr Declaration time_events_declaration() noexcept
+{
+    if constexpr (ListsTimes<System>) {
+        return Declaration::fits;
+    } else if constexpr (TimedByFunction<System> || TimedByState<System, X> ||
+                         Name_time_events::number<System>) {
+        return Declaration::absent;
+    } else {
+        return value_declaration<Name_time_events, System, false>();
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] constexpr Declaration previous_time_event_declaration() noexcept
+{
+    if constexpr (TimedBackward<System>) {
+        return Declaration::fits;
+    } else {
+        return unfit<Name_previous_time_event, System, X>();
+    }
+}
+
+/// Without next_time_event the function would never be called, and does not fit.
+template <class System, class X>
+[[nodiscard]] constexpr Declaration time_reset_declaration() noexcept
+{
+    if constexpr (is_refused<Name_next_time_event, System, X>(
+                      next_time_event_declaration<System, X>())) {
+        return Declaration::absent;
+    } else if constexpr (!TimeResetting<System, X>) {
+        return unfit<Name_time_reset, System, X>();
+    } else if constexpr (!Timed<System> && !TimedByState<System, X>) {
+        return Declaration::does_not_fit;
+    } else if constexpr (Name_time_reset::takes<const System, double, X> ||
+                         Name_time_reset::takes<const System, Mode, double, X>) {
+        return Declaration::by_value;
+    } else {
+        return Declaration::fits;
+    }
+}
+
 template <class System, class X>
 [[nodiscard]] constexpr Declaration guard_count_declaration() noexcept
 {
@@ -431,15 +499,30 @@ template <class System, class X>
 template <class System, class X>
 [[nodiscard]] constexpr Declaration mode_count_declaration() noexcept
 {
-    constexpr bool fits = requires(const System& system) { { system.mode_count } -> std::convertible_to<std::size_t>; } ||
-        requires(const System& system) { { system.mode_count() } -> std::convertible_to<std::size_t>; };
+    constexpr bool fits = requires(const System& system)
+    {
+        {
+            system.mode_count
+            } -> std::convertible_to<std::size_t>;
+    }
+    || requires(const System& system)
+    {
+        {
+            system.mode_count()
+            } -> std::convertible_to<std::size_t>;
+    };
     return value_declaration<Name_mode_count, System, fits>();
 }
 
 template <class System, class X>
 [[nodiscard]] constexpr Declaration crossing_declaration() noexcept
 {
-    constexpr bool fits = requires(const System& system) { { system.crossing } -> std::convertible_to<Crossing>; };
+    constexpr bool fits = requires(const System& system)
+    {
+        {
+            system.crossing
+            } -> std::convertible_to<Crossing>;
+    };
     return value_declaration<Name_crossing, System, fits>();
 }
 
@@ -447,26 +530,38 @@ template <class System, class X>
 template <class System, class X>
 [[nodiscard]] constexpr Declaration unilateral_declaration() noexcept
 {
-    constexpr bool fits = requires(const System& system) {
-        { system.unilateral } -> std::convertible_to<bool>;
+    constexpr bool fits = requires(const System& system)
+    {
+        {
+            system.unilateral
+            } -> std::convertible_to<bool>;
         requires !std::is_function_v<std::remove_reference_t<decltype((system.unilateral))>>;
     };
     return value_declaration<Name_unilateral, System, fits>();
 }
 
+/// Of a data member.
+template <class T>
+concept NotCalled = !std::is_function_v<std::remove_reference_t<T>>;
+
 /// Refuses names that are likely misspellings, with a sentence for each. A data member or a
 /// nested type whose name is near to that of a function has its own purpose.
-template <class System>
+template <class System, class Twice = NearNamesTwice<System>>
 struct NearNamesOf {
-#define RICOCHET_FUNCTION(wrong, right)                                                              \
-    static_assert(requires { &NearNamesTwice<System>::wrong; } || requires { typename System::wrong; } || \
-                      requires(const System& system) { requires !std::is_function_v<std::remove_reference_t<decltype((system.wrong))>>; }, \
-                  "ricochet: found a member `" #wrong "`, which nothing calls; rename it to `" #right "`, or declare " \
-                  "static constexpr bool unchecked_names = true if it is meant");
-#define RICOCHET_VALUE(wrong, right)                                                                 \
-    static_assert(requires { &NearNamesTwice<System>::wrong; } || requires { typename System::wrong; }, \
-                  "ricochet: found a member `" #wrong "`, which nothing reads; rename it to `" #right "`, or declare " \
-                  "static constexpr bool unchecked_names = true if it is meant");
+    static const System& system;
+#define RICOCHET_FUNCTION(wrong, right)                                                     \
+    static_assert(                                                                          \
+        requires { &Twice::wrong; } || requires { typename System::wrong; } ||              \
+            requires { requires NotCalled<decltype((system.wrong))>; },                     \
+        "ricochet: found a member `" #wrong "`, which nothing calls; rename it to `" #right \
+        "`, or declare "                                                                    \
+        "static constexpr bool unchecked_names = true if it is meant");
+#define RICOCHET_VALUE(wrong, right)                                                        \
+    static_assert(                                                                          \
+        requires { &Twice::wrong; } || requires { typename System::wrong; },                \
+        "ricochet: found a member `" #wrong "`, which nothing reads; rename it to `" #right \
+        "`, or declare "                                                                    \
+        "static constexpr bool unchecked_names = true if it is meant");
 #include "ricochet/detail/misspellings.inc"
 #undef RICOCHET_FUNCTION
 #undef RICOCHET_VALUE
@@ -478,54 +573,160 @@ struct NearNamesOf {
 template <class System, class X>
 constexpr bool check_declarations()
 {
-    constexpr bool checks_names = !requires { requires System::unchecked_names; };
-    if constexpr (checks_names && !SpeltWell<System>) static_assert(NearNamesOf<System>::checked);
+    constexpr bool checks_names = !requires
+    {
+        requires System::unchecked_names;
+    };
+    if constexpr (checks_names && !SpeltWell<NearNamesTwice<System>>)
+        static_assert(NearNamesOf<System>::checked);
 #define RICOCHET_CHECK(name, expected)                                                        \
     {                                                                                         \
         constexpr Declaration found = name##_declaration<System, X>();                        \
         static_assert(!checks_names || !is_hidden<Name_##name, System, X>(),                  \
-                      "ricochet: found a " #name " that cannot be used: it is private, or its " \
-                      "requires-clause does not hold; expected " expected "; or declare "      \
-                      "static constexpr bool unchecked_names = true if that is meant");        \
+                      "ricochet: found a " #name                                              \
+                      " that cannot be used: it is private, or its "                          \
+                      "requires-clause does not hold; expected " expected                     \
+                      "; or declare "                                                         \
+                      "static constexpr bool unchecked_names = true if that is meant");       \
         static_assert(found != Declaration::not_const,                                        \
                       "ricochet: found a " #name " that is not const; expected " expected);   \
         static_assert(found != Declaration::does_not_fit,                                     \
-                      "ricochet: found a " #name " whose parameters or result do not fit; "   \
+                      "ricochet: found a " #name                                              \
+                      " whose parameters or result do not fit; "                              \
                       "expected " expected);                                                  \
-        static_assert(found != Declaration::mode_for_which,                                   \
-                      "ricochet: found a " #name " that takes a Mode where the number of the " \
-                      "guard belongs, in a system with modes and guard_count; expected "      \
-                      expected);                                                              \
+        static_assert(found != Declaration::mode_before_which,                                \
+                      "ricochet: found a " #name                                              \
+                      " that takes the Mode before the number of "                            \
+                      "the guard; expected " expected);                                       \
+        static_assert(                                                                        \
+            found != Declaration::mode_for_which,                                             \
+            "ricochet: found a " #name                                                        \
+            " that takes a Mode where the number of the "                                     \
+            "guard belongs, in a system with modes and guard_count; expected " expected);     \
         static_assert(found != Declaration::which_without_count,                              \
-                      "ricochet: found a " #name " that takes std::size_t first, in a "       \
+                      "ricochet: found a " #name                                              \
+                      " that takes std::size_t first, in a "                                  \
                       "system without guard_count; expected guard_count, or " expected);      \
         static_assert(found != Declaration::by_value,                                         \
                       "ricochet: found a " #name " that changes a copy; expected " expected); \
     }
-    RICOCHET_CHECK(guard_count, "a number of guards: guard_count, or guard_count() const, convertible to std::size_t")
-    RICOCHET_CHECK(mode_count, "a number of modes: mode_count, or mode_count() const, convertible to std::size_t")
+    RICOCHET_CHECK(
+        guard_count,
+        "a number of guards: guard_count, or guard_count() const, convertible to std::size_t")
+    RICOCHET_CHECK(
+        mode_count,
+        "a number of modes: mode_count, or mode_count() const, convertible to std::size_t")
     RICOCHET_CHECK(crossing, "a data member of type ricochet::Crossing")
     RICOCHET_CHECK(unilateral, "a data member of type bool")
     RICOCHET_CHECK(flow, "void flow([Mode,] double t, const State& x, State& dxdt) const")
-    RICOCHET_CHECK(guard, "double guard([std::size_t which,] [Mode,] double t, const State& x) const, "
-                          "with `which` if and only if there is a guard_count; modes are a Mode, not an enum")
-    RICOCHET_CHECK(guards, "void guards([Mode,] double t, const State& x, std::span<double> g) const, with a guard_count")
-    RICOCHET_CHECK(guard_rate, "double guard_rate([std::size_t which,] [Mode,] double t, const State& x, const State& dxdt) const, "
-                               "with `which` if and only if there is a guard_count; modes are a Mode, not an enum")
-    RICOCHET_CHECK(guard_rates, "void guard_rates([Mode,] double t, const State& x, const State& dxdt, std::span<double> rates) const, with a guard_count")
-    RICOCHET_CHECK(guard_info, "GuardInfo guard_info(std::size_t which) const, or without `which` where there is no guard_count")
-    RICOCHET_CHECK(reset, "void reset([std::size_t which,] double t, State& x) const, or Mode reset([std::size_t which,] Mode, double t, State& x) const, "
-                          "or with const FiredGuards& for `which`; `which` if and only if there is a guard_count; and a guard")
-    RICOCHET_CHECK(rest, "void rest([std::size_t which,] double t, State& x) const, or Mode rest([std::size_t which,] Mode, double t, State& x) const, "
-                         "with `which` if and only if there is a guard_count; and a guard and a reset")
-    RICOCHET_CHECK(enabled, "bool enabled([std::size_t which,] Mode) const, or bool enabled([std::size_t which,] [Mode,] double t, const State& x) const, "
-                            "with `which` if and only if there is a guard_count")
-    RICOCHET_CHECK(next_time_event, "double next_time_event(double t) const")
+    RICOCHET_CHECK(
+        guard,
+        "double guard([std::size_t which,] [Mode,] double t, const State& x) const, "
+        "with `which` if and only if there is a guard_count; modes are a Mode, not an enum")
+    RICOCHET_CHECK(guards,
+                   "void guards([Mode,] double t, const State& x, std::span<double> g) const, with "
+                   "a guard_count")
+    RICOCHET_CHECK(
+        guard_rate,
+        "double guard_rate([std::size_t which,] [Mode,] double t, const State& x, const State& "
+        "dxdt) const, "
+        "with `which` if and only if there is a guard_count; modes are a Mode, not an enum")
+    RICOCHET_CHECK(guard_rates,
+                   "void guard_rates([Mode,] double t, const State& x, const State& dxdt, "
+                   "std::span<double> rates) const, with a guard_count")
+    RICOCHET_CHECK(guard_info,
+                   "GuardInfo guard_info(std::size_t which) const, or without `which` where there "
+                   "is no guard_count")
+    RICOCHET_CHECK(reset,
+                   "void reset([std::size_t which,] double t, State& x) const, or Mode "
+                   "reset([std::size_t which,] Mode, double t, State& x) const, "
+                   "or with const FiredGuards& for `which`; `which` if and only if there is a "
+                   "guard_count; and a guard")
+    RICOCHET_CHECK(rest,
+                   "void rest([std::size_t which,] double t, State& x) const, or Mode "
+                   "rest([std::size_t which,] Mode, double t, State& x) const, "
+                   "with `which` if and only if there is a guard_count; and a guard and a reset")
+    RICOCHET_CHECK(enabled,
+                   "bool enabled([std::size_t which,] Mode) const, or bool enabled([std::size_t "
+                   "which,] [Mode,] double t, const State& x) const, "
+                   "with `which` if and only if there is a guard_count")
+    RICOCHET_CHECK(next_time_event,
+                   "double next_time_event(double t) const, or double next_time_event([Mode,] "
+                   "double t, const State& x) const")
+    RICOCHET_CHECK(time_events,
+                   "ricochet::Times time_events, or const ricochet::Times& time_events() const")
     RICOCHET_CHECK(previous_time_event, "double previous_time_event(double t) const")
-    RICOCHET_CHECK(time_reset, "void time_reset(double t, State& x) const, or Mode time_reset(Mode, double t, State& x) const, with a next_time_event")
+    RICOCHET_CHECK(time_reset,
+                   "void time_reset(double t, State& x) const, or Mode time_reset(Mode, double t, "
+                   "State& x) const, with a next_time_event or Times time_events")
 #undef RICOCHET_CHECK
     if constexpr (CountsGuards<System>) {
-        static_assert(Guarded<System, X>, "ricochet: found guard_count, but neither guard(which, [mode,] t, x) nor guards([mode,] t, x, g) that fits the state");
+        static_assert(Guarded<System, X>,
+                      "ricochet: found guard_count, but neither guard(which, [mode,] t, x) nor "
+                      "guards([mode,] t, x, g) that fits the state");
+    }
+    return true;
+}
+
+// --- systems and starts ---
+
+/// Stands for the state of a system that declares none, where a start is given in braces.
+struct UndeclaredState {
+    UndeclaredState(std::initializer_list<double>);
+};
+
+template <class System>
+struct DeclaredStateOf {
+    using type = UndeclaredState;
+};
+template <class System>
+requires requires
+{
+    typename System::State;
+}
+struct DeclaredStateOf<System> {
+    using type = typename System::State;
+};
+
+/// The state that a system declares, which a start in braces has.
+template <class System>
+using DeclaredState = typename DeclaredStateOf<System>::type;
+
+/// Whether the flow fits the state type that the system declares, but not the type of the start.
+template <class System, class X>
+[[nodiscard]] consteval bool takes_another_state()
+{
+    if constexpr (requires { typename System::State; }) {
+        return !std::is_same_v<X, typename System::State> &&
+               Flowing<System, typename System::State>;
+    } else {
+        return false;
+    }
+}
+
+/// Refuses a system that cannot be run, or a start that is none, with one sentence. Returns true.
+template <class System, class X>
+constexpr bool check_system()
+{
+    if constexpr (std::is_same_v<X, UndeclaredState>) {
+        static_assert(
+            !std::is_same_v<X, UndeclaredState>,
+            "ricochet: found a start in braces for a system that declares no State; expected "
+            "`using State = std::array<double, n>` in the system, or State{...} as the start");
+    } else if constexpr (!StateVector<X>) {
+        static_assert(
+            StateVector<X>,
+            "ricochet: found a start that is no state; expected std::array, std::vector or a "
+            "vector of Eigen, of double");
+    } else if constexpr (!Flowing<System, X> && takes_another_state<System, X>()) {
+        static_assert(Flowing<System, X>,
+                      "ricochet: found a start of another type than System::State, which is what "
+                      "the flow takes");
+    } else {
+        static_assert(check_declarations<System, X>());
+        static_assert(!SpeltWell<NearNamesTwice<System>> || flow_declaration<System, X>() != Declaration::absent,
+                      "ricochet: found no flow that fits the state; expected void flow([Mode,] "
+                      "double t, const State& x, State& dxdt) const");
     }
     return true;
 }

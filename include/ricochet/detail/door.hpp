@@ -122,9 +122,14 @@ public:
             return change(*reinterpret_cast<X*>(x.data()));
         } else {
             copy_state(x, scratch_[2]);
-            const auto result = change(scratch_[2]);
-            copy_state(scratch_[2], x);
-            return result;
+            try {
+                const auto result = change(scratch_[2]);
+                copy_state(scratch_[2], x);
+                return result;
+            } catch (const Stop&) {  // it has changed the state before
+                copy_state(scratch_[2], x);
+                throw;
+            }
         }
     }
 
@@ -280,15 +285,34 @@ class TableOf {
 
     static constexpr void add_times(SystemTable<C>& table)
     {
-        table.next_time_event = [](void* door, double t) -> double {
-            return system(door).next_time_event(t);
-        };
+        static_assert(ListsTimes<System> + TimedByFunction<System> + TimedByState<System, X> == 1,
+                      "ricochet: found several of Times time_events, next_time_event(t) and "
+                      "next_time_event([mode,] t, x); expected one of them");
+        if constexpr (ListsTimes<System>) {
+            table.next_time_event = [](void* door, double t) {
+                return times_of(system(door)).next(t);
+            };
+            table.previous_time_event = [](void* door, double t) {
+                return times_of(system(door)).previous(t);
+            };
+            table.time_event_count = [](void* door, double t) {
+                return times_of(system(door)).count(t);
+            };
+        } else if constexpr (TimedByState<System, X>) {
+            table.next_time_event_at = [](void* door, Mode mode, double t, const C& x) -> double {
+                return call_timer(system(door), mode, t, at(door).read(x, 0));
+            };
+        } else {
+            table.next_time_event = [](void* door, double t) -> double {
+                return system(door).next_time_event(t);
+            };
+        }
         if constexpr (requires(const System& s, double t) { s.previous_time_event(t); }) {
             table.previous_time_event = [](void* door, double t) -> double {
                 return system(door).previous_time_event(t);
             };
         }
-        table.time_reset = &time_reset;
+        if constexpr (TimeResetting<System, X>) table.time_reset = &time_reset;
     }
 
     static constexpr void add_bounds(SystemTable<C>& table)
@@ -337,8 +361,8 @@ public:
         table.guard_count = [](void*) { return std::size_t{0}; };
         table.name = [](void* door) { return name_of_system(system(door)); };
         if constexpr (Guarded<System, X>) add_guards(table);
-        if constexpr (Timed<System>) add_times(table);
-        if constexpr (Bounded<System, X>) add_bounds(table);
+        if constexpr (Timed<System> || TimedByState<System, X>) add_times(table);
+        if constexpr (BoundedGuards<System, X>) add_bounds(table);
         return table;
     }
 };

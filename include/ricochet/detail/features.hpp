@@ -4,7 +4,6 @@
 // that a model names.
 #pragma once
 
-#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <concepts>
@@ -15,6 +14,7 @@
 #include <string>
 #include <string_view>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/dual_derivatives.hpp"
 #include "ricochet/hybrid/system.hpp"
 
@@ -86,7 +86,7 @@ namespace detail {
 /// 1 / x for x >= 0, the largest double instead of infinity; NaN stays NaN.
 [[nodiscard]] inline double saturated_reciprocal(double x) noexcept
 {
-    return std::min(1 / x, std::numeric_limits<double>::max());
+    return least_of(1 / x, std::numeric_limits<double>::max());
 }
 
 }  // namespace detail
@@ -107,7 +107,7 @@ namespace detail {
 {
     constexpr double a0 = 0.5;
     constexpr auto one = std::bit_cast<std::int64_t>(1.0);
-    const double y = std::min(std::abs(a) * (1 / a0), std::numeric_limits<double>::max());
+    const double y = detail::least_of(std::abs(a) * (1 / a0), std::numeric_limits<double>::max());
     const std::int64_t above_one = std::bit_cast<std::int64_t>(1 + y) - one;
     const double if_nan = y - y;
     return std::copysign(static_cast<double>(above_one) * 0x1p-52 + if_nan, a);

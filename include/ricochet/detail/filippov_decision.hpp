@@ -4,7 +4,6 @@
 // it slides. The rules are stated at `Filippov::reset`.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -78,7 +77,7 @@ public:
             const bool fired = exits & exit_bit(i, side);
             const auto later = [&](double time, const X& at) { return away(rates(time, at)); };
             if (!fired && !leads_away(away(now), to, t, x, later)) continue;
-            const double speed = fired ? 0 : std::max(away(now), 0.0);
+            const double speed = fired ? 0 : greatest_of(away(now), 0.0);
             if (speed > fastest) {
                 fastest = speed;
                 best = to;
@@ -117,7 +116,7 @@ public:
             const RegionRates rates = around(both, slides, time, later).rates;
             const SlidingShares sliding = sliding_shares(rates);
             const auto& [first, second] = sliding.shares;
-            const double room = std::min({first, 1 - first, second, 1 - second});
+            const double room = least_of(least_of(first, 1 - first), least_of(second, 1 - second));
             if (room > 0 && sliding.apart > 0) return false;
             next = decide_on_both(sliding.shares, time, later);
             return room < -1e-5 || sliding.apart < -2e-4;
@@ -189,7 +188,7 @@ public:
         flow(at, t, x, v);
         const TimeScales times(t, largest_component(x), largest_component(v));
         const double most = 0x1p-6 * times.longest;
-        for (double s = 0x1p-50 * times.shortest;; s = std::min(16 * s, most)) {
+        for (double s = 0x1p-50 * times.shortest;; s = least_of(16 * s, most)) {
             move(moved, x, s, v);
             if (clear(t + s, moved)) return true;
             if (!(s < most)) return false;
@@ -250,7 +249,7 @@ public:
         if (!Motion::is_beyond(which, next[which], t, x)) return clock;
         const double h = surface(which, t, x);
         const double rate = rate_along(which, next, t, x);
-        return h * rate < 0 ? std::max(clock, 2 * std::fabs(h / rate)) : clock;
+        return h * rate < 0 ? greatest_of(clock, 2 * std::fabs(h / rate)) : clock;
     }
 
     /// Moves x along its motion by the smallest possible amount, or onto its own side of the
@@ -264,7 +263,7 @@ public:
         double time = 0;
         for (std::size_t i = 0; i < surface_count; ++i) {
             const bool beyond = (on & bit(i)) && Motion::is_beyond(i, at[i], t, x);
-            if (beyond) time = std::max(time, uncertainty(i, at, t, x));
+            if (beyond) time = greatest_of(time, uncertainty(i, at, t, x));
         }
         const double speed = largest_component(v[0]);
         for_each_component(x, [&](auto i) {

@@ -4,7 +4,6 @@
 // combinations of them that slide. The base of `Filippov`; it makes no decisions.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <concepts>
@@ -42,7 +41,7 @@ template <class X>
 [[nodiscard]] double largest_component(const X& x) noexcept
 {
     double largest = 0;
-    for_each_component(x, [&](auto i) { largest = std::max(largest, std::fabs(x[i])); });
+    for_each_component(x, [&](auto i) { largest = greatest_of(largest, std::fabs(x[i])); });
     return largest;
 }
 
@@ -58,9 +57,9 @@ struct TimeScales {
         const double turn = size / speed;
         const double day = std::fabs(t);
         const bool turns = turn > 0 && std::isfinite(turn);
-        longest = std::max(turns ? turn : 0, day);
+        longest = greatest_of(turns ? turn : 0, day);
         if (!(longest > 0)) longest = 1;
-        shortest = turns && day > 0 ? std::min(turn, day) : longest;
+        shortest = turns && day > 0 ? least_of(turn, day) : longest;
     }
 };
 
@@ -78,7 +77,7 @@ template <class Function, std::size_t count>
 {
     using Values = std::array<double, count>;
     const double most = 1e-2 * times.longest;
-    double s = 1e-5 * std::max(times.shortest, 1e-6 * times.longest);
+    double s = 1e-5 * greatest_of(times.shortest, 1e-6 * times.longest);
     Values rates;
     rates.fill(std::numeric_limits<double>::quiet_NaN());
     for (int round = 0; round < 20; ++round) {
@@ -86,13 +85,13 @@ template <class Function, std::size_t count>
         const Values behind = g(-s);
         double change = 0;
         for (std::size_t k = 0; k < count; ++k) {
-            change = std::max(change, std::fabs(ahead[k] - here[k]) / size);
-            change = std::max(change, std::fabs(here[k] - behind[k]) / size);
+            change = greatest_of(change, std::fabs(ahead[k] - here[k]) / size);
+            change = greatest_of(change, std::fabs(here[k] - behind[k]) / size);
         }
         if (change > 1e-3) {
-            s *= std::max(1e-5 / change, 1e-6);
+            s *= greatest_of(1e-5 / change, 1e-6);
         } else if (change < 1e-6 && s < most) {
-            s = std::min(s * std::min(1e-5 / change, 1e4), most);
+            s = least_of(s * least_of(1e-5 / change, 1e4), most);
         } else {
             for (std::size_t k = 0; k < count; ++k) rates[k] = (ahead[k] - behind[k]) / (2 * s);
             break;
@@ -175,9 +174,9 @@ public:
         if constexpr (RatedSurfaces<Fields, X>) {
             return fields_.surface_rate(which, t, x, v);
         } else {
-            const double size = std::max(1.0, largest_component(x));
+            const double size = greatest_of(1.0, largest_component(x));
             const double speed = largest_component(v);
-            const double delta = 6e-6 * (speed > 0 ? size / speed : std::max(1.0, std::fabs(t)));
+            const double delta = 6e-6 * (speed > 0 ? size / speed : greatest_of(1.0, std::fabs(t)));
             Scratch<X, 1> moved(x);
             move(moved[0], x, delta, v);
             const double ahead = fields_.surface(which, t + delta, moved[0]);
@@ -236,7 +235,7 @@ public:
         for (unsigned region = 0; region < 4; ++region) {
             if ((region & ~on) != aside) continue;
             fields_.field(region, t, x, f[0]);
-            result.speed = std::max(result.speed, largest_component(f[0]));
+            result.speed = greatest_of(result.speed, largest_component(f[0]));
             for (std::size_t i = 0; i < surface_count; ++i) {
                 if (on & bit(i)) result.rates[i][region] = resolved_rate(i, t, x, f[0]);
             }
@@ -252,7 +251,7 @@ public:
         if (on == both) {
             const auto [shares, apart] = sliding_shares(rates);
             result = {shares.first, 1 - shares.first, shares.second, 1 - shares.second};
-            for (double& exit : result) exit = std::min(exit, apart);
+            for (double& exit : result) exit = least_of(exit, apart);
         } else if (on != 0) {
             const std::size_t i = only(on);
             result[2 * i] = rates[i][region_of(put(at, i, Place::below))];
@@ -361,7 +360,8 @@ private:
         // A share in [0, 1] keeps the excess within the jump. Beyond the exit, in a step that will
         // be cut there, and where both fields become tangent, only this clamp does.
         const double most = 2 * std::fabs(normal);
-        const double excess = std::clamp(rate_below + restoring(which, t, x), -most, most);
+        const double excess =
+            least_of(greatest_of(rate_below + restoring(which, t, x), -most), most);
         for_each_component(x, [&](auto i) {
             const double jump = f[0][i] - dxdt[i];
             // Fields with the same rate of the surface do not determine the share.

@@ -3,9 +3,9 @@
 // How a step calls the flow: by pointer, or inlined.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/step_state.hpp"
 
 // A program of many small systems that take few steps compiles in half the time with flows called
@@ -47,7 +47,7 @@ struct FlowCaller {
     /// The time at which the flow is evaluated for a stage at the time t.
     [[nodiscard]] double stage_time(double t, double) const noexcept
     {
-        return std::min(std::max(t, flow_from), flow_to);
+        return least_of(greatest_of(t, flow_from), flow_to);
     }
     template <bool is_end>
     [[nodiscard]] double stage_time(double t, StageOffset<is_end> s) const noexcept

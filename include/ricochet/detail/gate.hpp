@@ -11,11 +11,11 @@
 
 #include <array>
 #include <cstddef>
-#include <memory>
 #include <optional>
 #include <string_view>
 
 #include "ricochet/detail/gate_features.hpp"
+#include "ricochet/detail/owner.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
@@ -105,7 +105,7 @@ public:
 private:
     void check_step(double smallest, double largest) const;
 
-    std::shared_ptr<const Classifier> classifier_;
+    detail::Shared<Classifier> classifier_;
     GateRecipe recipe_;
     bool horizon_;
 };

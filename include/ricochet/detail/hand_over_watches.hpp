@@ -57,11 +57,12 @@ private:
 };
 
 /// Whether a run advances so little, over the effort of 20 000 steps without an event, that not
-/// even a hundred times the effort it may make would reach its end.
+/// even a hundred times the effort it may make would reach its end, and far less than so far.
 class PaceWatch {
 public:
     PaceWatch(double t, double t_end, std::uint64_t most_effort) noexcept
-        : t_(t),
+        : start_(t),
+          t_(t),
           least_((t_end - t) * static_cast<double>(interval) /
                  (1e2 * static_cast<double>(most_effort)))
     {
@@ -71,7 +72,9 @@ public:
     [[nodiscard]] bool operator()(double t, std::uint64_t effort, std::uint64_t events) noexcept
     {
         if (effort < due_) return false;
-        const bool hopeless = due_ > 0 && events == events_ && t - t_ < least_;
+        const double advance = t - t_;
+        const bool hopeless =
+            due_ > 0 && events == events_ && advance < least_ && advance < 1e-6 * (t - start_);
         due_ = effort + interval;
         events_ = events;
         t_ = t;
@@ -80,7 +83,7 @@ public:
 
 private:
     static constexpr std::uint64_t interval = 20'000;
-    double t_, least_;
+    double start_, t_, least_;
     std::uint64_t due_ = 0, events_ = 0;
 };
 

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 
 #include "ricochet/detail/alignment.hpp"
 

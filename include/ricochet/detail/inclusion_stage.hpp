@@ -13,6 +13,7 @@
 // and does not depend on any quantity that a solver carries along.
 #pragma once
 
+#include <algorithm>
 #include <limits>
 
 #include "ricochet/detail/any_inclusion.hpp"

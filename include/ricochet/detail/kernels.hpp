@@ -5,8 +5,7 @@
 
 #include <cstdint>
 #include <limits>
-#include <memory>
-#include <optional>
+#include <new>
 #include <type_traits>
 
 #include "ricochet/detail/quiet_steps.hpp"
@@ -21,12 +20,13 @@ class KernelOf {
     using Stepper = typename Of::Stepper;
     using State = StepState<C>;
 
-    /// Takes a step. Returns the largest ratio of error to tolerance, 0 without an estimate; NaN if
-    /// the step is not finite.
-    template <bool with_error>
-    [[gnu::always_inline]] static double go(void* door, State& step, double h, double rtol,
-                                            double atol)
+    /// Takes a step. Returns the largest ratio of error to tolerance, 0 without an estimate, which
+    /// a negative `rtol` leaves out; NaN if the step is not finite.
+    RICOCHET_BY_ONES [[gnu::noinline]] static double attempt(void* door, State& step, double h,
+                                                             [[maybe_unused]] double rtol,
+                                                             [[maybe_unused]] double atol)
     {
+        const bool with_error = has_error_estimate<Stepper> && rtol >= 0;
         step.h = h;
         step.has_middle = false;
         step.asked_alone = 0;
@@ -34,27 +34,24 @@ class KernelOf {
         typename Of::Stages k;
         typename Of::Values of(step);
         if constexpr (Of::ours) {
-            Of::template depart<with_error>(caller, k.data(), h, of);
+            Of::depart(caller, k.data(), h, of, with_error);
         } else {
-            Of::template depart<with_error>(caller, Of::at(door).advancing, h, of);
+            Of::depart(caller, Of::at(door).advancing, h, of, with_error);
         }
         const bool finite = Of::end(caller, h, of);
         Of::store(step, k, of);
         caller.leave(step);
         if (!finite) return std::numeric_limits<double>::quiet_NaN();
-        return with_error ? Of::worst_ratio(step, of, rtol, atol) : 0;
+        if constexpr (has_error_estimate<Stepper>) {
+            if (with_error) return Of::worst_ratio(step, of, rtol, atol);
+        }
+        return 0;
     }
 
-    RICOCHET_BY_ONES static bool take(void* door, State& step, double h)
+    static bool take(void* door, State& step, double h)
     {
-        const double ratio = go<false>(door, step, h, 0, 0);
+        const double ratio = attempt(door, step, h, -1, 0);
         return ratio == ratio;
-    }
-
-    RICOCHET_BY_ONES static double attempt(void* door, State& step, double h, double rtol,
-                                           double atol)
-    {
-        return go<true>(door, step, h, rtol, atol);
     }
 
     RICOCHET_BY_ONES static void depart_only(void* door, State& step, double s, C& w, C& rate)
@@ -63,11 +60,11 @@ class KernelOf {
         typename Of::Values of(step);
         if constexpr (Of::ours) {
             typename Of::Stages k;
-            Of::template depart<false>(caller, k.data(), s, of);
+            Of::depart(caller, k.data(), s, of, false);
             Of::put(of.w, w);
             if constexpr (is_fsal<Stepper>) Of::put(of.w_rate, rate);
         } else {
-            Of::template depart<false>(caller, Of::at(door).probing, s, of);
+            Of::depart(caller, Of::at(door).probing, s, of, false);
             copy_state(of.w, w);
             if constexpr (is_fsal<Stepper>) copy_state(of.w_rate, rate);
         }
@@ -87,24 +84,11 @@ class KernelOf {
     {
         for (Stepper* stepper : {&Of::at(door).advancing, &Of::at(door).probing}) {
             if constexpr (std::is_trivially_destructible_v<Stepper>) {
-                std::construct_at(stepper);  // an assignment would copy what is not yet written
+                ::new (stepper) Stepper();  // an assignment would copy what is not yet written
             } else {
                 *stepper = Stepper();
             }
         }
-    }
-
-    /// @tparam Screen  `Ends` or `Extremum`; void without a guard
-    template <bool controlled, class Screen>
-    RICOCHET_BY_ONES static void run_quietly(void* door, State& step, QuietRun& run)
-    {
-        using Steps = QuietSteps<System, X, Method, controlled, Screen>;
-        FlowCaller<C> caller(door, step);
-        typename Of::Values of(step);
-        typename Of::Stages k;
-        typename Steps::Samples at{.sign = run.sign, .g0 = run.g0, .rate0 = run.rate0};
-        double h = run.h_next;
-        Steps{door, step, run, caller, of, k, at, h}.go();
     }
 
 public:
@@ -114,7 +98,7 @@ public:
     [[nodiscard]] static constexpr QuietKernel<C> quiet() noexcept
     {
         if constexpr (fits_registers<X> && fixed_size<C>() > 0) {
-            return &run_quietly<controlled, Screen>;
+            return &QuietSteps<System, X, Method, controlled, Screen>::go;
         } else {
             return nullptr;
         }

@@ -23,6 +23,7 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/detail/declarations.hpp"
 #include "ricochet/detail/differences.hpp"
 #include "ricochet/detail/directions.hpp"
 #include "ricochet/detail/dual_derivatives.hpp"
@@ -82,6 +83,32 @@ template <class System, class X>
     } else {
         return system.guard_derivative(at.t, at.x, at.s);
     }
+}
+
+/// Whether the derivatives that take a mode and the number of a guard take the number first.
+template <class System, class X>
+[[nodiscard]] constexpr bool derivatives_in_order() noexcept
+{
+    using Which = Only<std::size_t>;
+    constexpr bool guard =
+        requires(const System& of, Which which, Only<Mode> mode, double t, const X& x)
+    {
+        of.guard_derivative(mode, which, t, x, x);
+    }
+    &&!requires(const System& of, Which which, Only<Mode> mode, double t, const X& x)
+    {
+        of.guard_derivative(which, mode, t, x, x);
+    };
+    constexpr bool reset =
+        requires(const System& of, Which which, Only<Mode> mode, double t, const X& x, X& s)
+    {
+        of.reset_derivative(mode, which, t, x, t, s);
+    }
+    &&!requires(const System& of, Which which, Only<Mode> mode, double t, const X& x, X& s)
+    {
+        of.reset_derivative(which, mode, t, x, t, s);
+    };
+    return !guard && !reset;
 }
 
 template <class System, class X, class... Which>

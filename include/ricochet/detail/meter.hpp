@@ -18,13 +18,13 @@
 // Used through `Metered`; the state lives in the run, not in the detector.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/integrate/run.hpp"
 
 namespace ricochet {
@@ -89,8 +89,8 @@ public:
     void add(double sample) noexcept
     {
         ++samples_;
-        if (samples_ > 1) sample = std::min(sample, 3 * value_);
-        const double weight = std::max(1.0 / static_cast<double>(samples_), 1.0 / 16);
+        if (samples_ > 1) sample = detail::least_of(sample, 3 * value_);
+        const double weight = detail::greatest_of(1.0 / static_cast<double>(samples_), 1.0 / 16);
         value_ += weight * (sample - value_);
     }
 

@@ -4,7 +4,6 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 #include <span>
 #include <vector>
 
@@ -81,8 +80,8 @@ public:
 /// @param cuts_at_all  guards without a reset cut the step, too
 /// @throws std::invalid_argument as `EventMonitor` does
 template <class X>
-[[nodiscard]] std::unique_ptr<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
-                                                          const Options& options, bool cuts_at_all);
+[[nodiscard]] Owner<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
+                                                const Options& options, bool cuts_at_all);
 
 }  // namespace detail
 

@@ -3,12 +3,12 @@
 // Steps without an event, with the flow and the guard of a system inlined.
 #pragma once
 
-#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/step_of.hpp"
@@ -48,32 +48,37 @@ public:
     Samples& at;
     double& h;
 
-    [[gnu::always_inline]] void go()
+    RICOCHET_BY_ONES static void go(void* door, StepState<C>& step, QuietRun& run)
     {
+        FlowCaller<C> caller(door, step);
+        Values of(step);
+        Stages k;
+        Samples at{.sign = run.sign, .g0 = run.g0, .rate0 = run.rate0};
+        double h = run.h_next;
+        QuietSteps steps{door, step, run, caller, of, k, at, h};
         run.why = QuietEnd::due;
         run.repeated = false;
-        while (goes_on()) {
-            double next = h;
-            if (!take(next)) {
-                leave(h);
-                break;
-            }
+        double next = h;
+        while (steps.goes_on()) {
+            next = h;
+            if (!steps.take(next)) break;
             if constexpr (guarded) {
-                const QuietEnd why = screen();
+                const QuietEnd why = steps.screen();
                 if (why != QuietEnd::due) {
                     run.why = why;
-                    leave(next);
                     break;
                 }
                 at.g0 = at.g1;
                 at.rate0 = at.rate1;
             }
-            accept();
+            steps.accept();
             h = next;
         }
+        steps.put_start();
         if (run.why == QuietEnd::due) {
             run.h_next = h;
-            put_start();
+        } else {
+            steps.leave(run.why == QuietEnd::failed ? h : next);
         }
         caller.leave(step);
         run.g0 = at.g0;
@@ -123,7 +128,7 @@ private:
     [[nodiscard]] static double smallest_step(double h_min, double t) noexcept
     {
         const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(t);
-        return std::max(h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
+        return greatest_of(h_min, greatest_of(4 * ulp, std::numeric_limits<double>::min()));
     }
 
     [[nodiscard, gnu::always_inline]] auto guard_at_end() const
@@ -153,7 +158,7 @@ private:
         double largest = rule.largest;
         run.repeated = false;
         for (;;) {
-            Of::template depart<controlled>(caller, k.data(), h, of);
+            Of::depart(caller, k.data(), h, of, controlled);
             const bool finite = Of::end(caller, h, of);
             if constexpr (!controlled) {
                 if (!finite) run.why = QuietEnd::failed;
@@ -162,8 +167,8 @@ private:
             run.error = finite ? Of::worst_ratio(step, of, run.rtol, run.atol)
                                : std::numeric_limits<double>::quiet_NaN();
             if (rule.accepts(run.error)) {
-                const double factor = std::min(largest, rule.factor(run.error, order));
-                next = std::min(h * factor, run.h_max);
+                const double factor = least_of(largest, rule.factor(run.error, order));
+                next = least_of(h * factor, run.h_max);
                 return true;
             }
             const double shorter = h * rule.factor(run.error, order);
@@ -238,7 +243,6 @@ private:
     /// Leaves the current step where the loop expects it.
     [[gnu::always_inline]] void leave(double next)
     {
-        put_start();
         step.h = h;
         step.has_middle = false;
         step.asked_alone = 0;

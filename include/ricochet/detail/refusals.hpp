@@ -38,9 +38,16 @@ namespace ricochet::detail {
 [[noreturn]] void throw_forward_only();
 /// @throws std::invalid_argument: no previous_time_event for a run backward in time.
 [[noreturn]] void throw_no_previous_time_event();
-/// @throws std::invalid_argument: the first time event is not ahead of the start.
-[[noreturn]] void throw_time_event_not_ahead(std::string_view who, bool backward, double t,
-                                             double found);
+/// @throws std::invalid_argument: the first time event is not ahead of the start; that of a timer
+/// in the state, `by_state`, may be at the start.
+[[noreturn]] void throw_time_event_not_ahead(std::string_view who, bool backward, bool by_state,
+                                             double t, double found);
+/// @throws std::invalid_argument: a guard has `what`, at_start or at_entry, and `but`, which gives
+/// it no condition that could hold.
+[[noreturn]] void throw_no_condition(std::string_view who, std::size_t which, std::string_view name,
+                                     std::string_view what, std::string_view but);
+/// @throws std::invalid_argument: an infinite t_end of a run that nothing ends.
+[[noreturn]] void throw_endless(double t_end);
 /// @throws std::invalid_argument: a restart outside of the run.
 [[noreturn]] void throw_restart_outside(double t, double t_start, double t_end);
 /// @throws std::invalid_argument: a restart from a state of another dimension.

@@ -83,7 +83,7 @@ public:
         run("every 2 steps", EveryK(2));
         run("every 4 steps", EveryK(4));
         run("every 8 steps", EveryK(8));
-        if constexpr (Bounded<System, X>) {
+        if constexpr (BoundedGuards<System, X>) {
             bool bounded = true;
             if constexpr (requires { system_->is_bounded(); }) bounded = system_->is_bounded();
             if (bounded) run("what bounds demand", Planned{});

@@ -198,24 +198,33 @@ public:
     }();
     static constexpr bool has_dense_output = requires { Tableau::dense(0.5); };
 
+    static constexpr std::make_index_sequence<kept_stages> inner_stages{};
+
+    // In these functions a level of calls, be it of a lambda, is one more copy of a whole step that
+    // the compiler has to optimise. Hence the sequences among the parameters.
+
     /// w(h) from the flow of the departures, `flow(w, w_rate, offset)`. If the method is FSAL, the
     /// rate at the end is computed too; `with_error`: so is the error estimate. `like` gives the
     /// size of a state that is sized at run time.
-    template <bool with_error, class Flow>
-    [[gnu::always_inline]] static void depart(const Flow& flow, const X& like, double h, X* k,
-                                              const StepDeparture<X>& to)
+    template <class Flow, std::size_t... I>
+    [[gnu::always_inline]] static void depart(const Flow& flow, [[maybe_unused]] const X& like,
+                                              double h, X* k, const StepDeparture<X>& to,
+                                              [[maybe_unused]] bool with_error,
+                                              std::index_sequence<I...> /*inner_stages*/)
     {
         if constexpr (fixed_size<X>() == 0) {
             for (std::size_t i = 0; i < kept_stages; ++i) {
                 if (k[i].size() != like.size()) k[i] = like;
             }
         }
-        inner_stages(flow, h, k, std::make_index_sequence<kept_stages>{});
+        (flow(RowView<Stage<I + 1>, I>(h, k), k[I], offset_of<I + 1>(h)), ...);
         combine<Weights>(h, k, to.rate, to.w);
         if constexpr (fsal) {
             flow(RowView<Weights, kept_stages>(h, k), to.rate, StageOffset<true>{h});
         }
-        if constexpr (with_error) estimate(h, k, to.rate, to.error);
+        if constexpr (estimates_error) {
+            if (with_error) estimate(h, k, to.rate, to.error);
+        }
     }
 
     /// Number of weights of the rates in w on the dense output.
@@ -248,12 +257,15 @@ public:
     [[nodiscard, gnu::always_inline]] static double dense(const Array& weights, const X* k,
                                                           const X& rate, Index c)
     {
-        return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline))
-        {
-            return (... + (weights[used<Weights>.at[I]] * stage<used<Weights>.at[I]>(k, rate)[c])) +
-                   weights[Tableau::stages] * rate[c];
-        }
-        (std::make_index_sequence<used<Weights>.count>{});
+        return dense(weights, k, rate, c, all_used<Weights>);
+    }
+    template <class Array, class Index, std::size_t... I>
+    [[nodiscard, gnu::always_inline]] static double dense(const Array& weights, const X* k,
+                                                          const X& rate, Index c,
+                                                          std::index_sequence<I...> /*all_used*/)
+    {
+        return (... + (weights[used<Weights>.at[I]] * k[used<Weights>.at[I] - 1][c])) +
+               weights[Tableau::stages] * rate[c];
     }
 
     template <std::size_t i>
@@ -296,6 +308,8 @@ public:
 
     template <class Row>
     static constexpr std::size_t terms = used<Row>.count;
+    template <class Row>
+    static constexpr std::make_index_sequence<terms<Row>> all_used{};
 
     /// Factors of a row's rates in a step of length h.
     template <class Row>
@@ -334,16 +348,17 @@ public:
 
     /// The state at offset s of a row that ends with the newest stage, whose rate is that of the
     /// flow itself, `newest`.
-    template <class Row, class Array, class Rate>
+    ///
+    /// @param weight  of the newest rate
+    /// @param older   sum of the terms before
+    template <class Row>
     [[nodiscard, gnu::always_inline]] static double state_of(const AtStart& start, double s,
-                                                             const Array& weights, const Rate& rate,
+                                                             double weight, double older,
                                                              double newest)
     {
         constexpr std::size_t before = used<Row>.count - 1;
-        const double weight = weights[before];
         const double last = weight * newest;
         if constexpr (before > 0) {
-            const double older = sum_of<Row, before>(weights, rate);
             return start.x + ((older + (s - weight) * start.rate) + last);
         } else if constexpr (Row::coefficients[used<Row>.at[0]] != Row::node) {
             return start.x + ((s - weight) * start.rate + last);
@@ -352,18 +367,20 @@ public:
         }
     }
 
-    /// The same for the rates in `k`, and `rate` at the end, for one component; 0 without rates.
-    template <class Row, class Array, class Index>
-    [[nodiscard, gnu::always_inline]] static double sum(const Array& weights,
+    /// The sum of the first terms of a row in a step of length h, for one component: of the rates
+    /// in `k`, and `rate` at the end. 0 without terms.
+    template <class Row, class Index, std::size_t... I>
+    [[nodiscard, gnu::always_inline]] static double sum([[maybe_unused]] double h,
                                                         [[maybe_unused]] const X* k,
-                                                        [[maybe_unused]] const X& rate, Index c)
+                                                        [[maybe_unused]] const X& rate,
+                                                        [[maybe_unused]] Index c,
+                                                        std::index_sequence<I...>)
     {
-        if constexpr (used<Row>.count == 0) {
+        if constexpr (sizeof...(I) == 0) {
             return 0;
         } else {
-            return sum_of<Row>(
-                weights, [&](auto j)
-                             __attribute__((always_inline)) { return stage<j>(k, rate)[c]; });
+            return (... + (Row::times(h, used<Row>.at[I]) *
+                           (used<Row>.at[I] <= kept_stages ? k[used<Row>.at[I] - 1] : rate)[c]));
         }
     }
 
@@ -375,29 +392,26 @@ private:
         static constexpr bool split = ends_with<Row, newest>;
 
     public:
-        [[gnu::always_inline]] RowView(double h, const X* k) noexcept
-            : k_(k), weights_(weights_of<Row>(h))
-        {
-        }
+        [[gnu::always_inline]] RowView(double h, const X* k) noexcept : k_(k), h_(h) {}
         template <class Index>
         [[nodiscard, gnu::always_inline]] double operator[](Index c) const
         {
-            return sum<Row>(weights_, k_, k_[0], c);
+            return sum<Row>(h_, k_, k_[0], c, all_used<Row>);
         }
         /// The state at offset s.
         template <class Index>
         [[nodiscard, gnu::always_inline]] double state(Index c, const AtStart& start, double s,
                                                        double rate) const requires split
         {
-            return state_of<Row>(
-                start, s,
-                weights_, [&](auto j) __attribute__((always_inline)) { return k_[j - 1][c]; },
-                rate);
+            constexpr std::size_t before = terms<Row> - 1;
+            return state_of<Row>(start, s, Row::times(h_, newest),
+                                 sum<Row>(h_, k_, k_[0], c, std::make_index_sequence<before>{}),
+                                 rate);
         }
 
     private:
         const X* k_;
-        decltype(weights_of<Row>(0.0)) weights_;
+        double h_;
     };
 
     template <std::size_t i>
@@ -405,14 +419,6 @@ private:
     {
         constexpr bool is_end = Tableau::c[i] == 0 || Tableau::c[i] == 1;
         return StageOffset<is_end>{h * Tableau::c[i]};
-    }
-
-    template <class Flow, std::size_t... I>
-    [[gnu::always_inline]] static void inner_stages(const Flow& flow, [[maybe_unused]] double h,
-                                                    [[maybe_unused]] X* k,
-                                                    std::index_sequence<I...>)
-    {
-        (flow(RowView<Stage<I + 1>, I>(h, k), k[I], offset_of<I + 1>(h)), ...);
     }
 
     template <class Index>
@@ -433,7 +439,7 @@ private:
             for_each_component(
                 error, [&](auto c) __attribute__((always_inline)) {
                     if (error[c] != 0 || !are_twins(k, c)) return;
-                    error[c] = sum<QuadratureErrors>(weights_of<QuadratureErrors>(h), k, rate, c);
+                    error[c] = sum<QuadratureErrors>(h, k, rate, c, all_used<QuadratureErrors>);
                 });
         }
     }
@@ -441,21 +447,10 @@ private:
     template <class Row>
     [[gnu::always_inline]] static void combine(double h, const X* k, const X& rate, X& w)
     {
-        const auto weights = weights_of<Row>(h);
         for_each_component(
-            w, [&](auto c)
-                   __attribute__((always_inline)) { w[c] = sum<Row>(weights, k, rate, c); });
-    }
-
-    template <std::size_t j>
-    [[nodiscard]] static const X& stage([[maybe_unused]] const X* k,
-                                        [[maybe_unused]] const X& rate) noexcept
-    {
-        if constexpr (j <= kept_stages) {
-            return k[j - 1];
-        } else {
-            return rate;
-        }
+            w, [&](auto c) __attribute__((always_inline)) {
+                w[c] = sum<Row>(h, k, rate, c, all_used<Row>);
+            });
     }
 };
 

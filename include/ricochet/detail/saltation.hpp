@@ -102,7 +102,7 @@ public:
                 bool lost = moves_beyond(linearization_.around(j), t, reach);
                 time.dt[index(initial_ + j)] =
                     linearization_.by_parameter(j, [&](const System& system) {
-                        const double near = system.next_time_event(t - reach);
+                        const double near = call_next_time_event(system, t - reach);
                         lost = lost || !(std::fabs(near - t) < reach);
                         return near;
                     });
@@ -320,8 +320,8 @@ private:
     /// Distance in time [s] around t without another time event.
     [[nodiscard]] double reach_of_time_event(double t) const
     {
-        double reach = std::min(system().next_time_event(t) - t, 1 + std::fabs(t)) / 4;
-        while (system().next_time_event(t - reach) < t && t - reach / 2 < t) reach /= 2;
+        double reach = std::min(call_next_time_event(system(), t) - t, 1 + std::fabs(t)) / 4;
+        while (call_next_time_event(system(), t - reach) < t && t - reach / 2 < t) reach /= 2;
         return reach;
     }
 
@@ -329,7 +329,7 @@ private:
     /// closest system predicts: from there on another event may take its place.
     [[nodiscard]] static bool moves_beyond(const Neighbours<System>& around, double t, double reach)
     {
-        const double moved = std::fabs(around.closest->next_time_event(t - reach) - t);
+        const double moved = std::fabs(call_next_time_event(*around.closest, t - reach) - t);
         const double rounding = 8 * epsilon * std::fabs(t);
         return !(std::max(moved - rounding, 0.0) * around.widening() < reach);
     }

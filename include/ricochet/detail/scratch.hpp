@@ -10,10 +10,10 @@
 
 #include <array>
 #include <cstddef>
-#include <memory>
 #include <vector>
 
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/owner.hpp"
 
 namespace ricochet::detail {
 
@@ -38,8 +38,8 @@ public:
     explicit Scratch(const Like& like)
     {
         auto& rooms = loans().rooms;
-        if (loans().lent == rooms.size()) rooms.push_back(std::make_unique<Room>());
-        room_ = rooms[loans().lent].get();
+        if (loans().lent == rooms.size()) rooms.emplace_back(new Room);
+        room_ = &*rooms[loans().lent];
         for (X& x : *room_) {
             using Size = decltype(x.size());
             const auto size = static_cast<Size>(like.size());
@@ -56,7 +56,7 @@ public:
 private:
     using Room = std::array<X, n>;
     struct Loans {
-        std::vector<std::unique_ptr<Room>> rooms;
+        std::vector<Owner<Room>> rooms;
         std::size_t lent = 0;
     };
     [[nodiscard]] static Loans& loans()

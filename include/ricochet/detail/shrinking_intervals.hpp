@@ -38,7 +38,14 @@ public:
             return false;
         }
         shrinking_ = seen_ >= 2 && interval < interval_ ? shrinking_ + 1 : 0;
+        if (seen_ >= 2 && interval > interval_ && interval < longest_ / 32) {
+            longer_ = interval;
+            since_longer_ = 0;
+        } else if (longer_ > 0 && ++since_longer_ > 16) {
+            longer_ = 0;
+        }
         const double ratio = shrinking_ > 0 ? interval / interval_ : 1;
+        surprise_ = shrinking_ > 1 ? std::fabs(interval - interval_ * ratio_) : 0;
         geometric_ = interval + 4 * resolution() >= interval_ * ratio_ / 16;
         ratio_ = ratio;
         last_ = t;
@@ -140,20 +147,23 @@ public:
         return lingering_ >= 3;
     }
 
-    /// Records that the time of the last event is known to `error` [s].
+    /// Records that the time of the last event is known to `error` [s], or lies anywhere in the
+    /// last interval.
     void blame(double error) noexcept
     {
-        late_ = error;
-        blamed_ += error;
+        late_ = std::fmin(error, interval_);
+        blamed_ += late_;
     }
 
     /// Uncertainty [s] of the limit: an event that is late by d delays all later ones by
-    /// d (1 + q) / (1 - q) in the end.
+    /// d (1 + q) / (1 - q) in the end. Intervals that have not always shrunk may be a few of many
+    /// in a round of another guard.
     [[nodiscard]] double error() const noexcept
     {
         const double q = std::min(usual_ratio_, ratio_);
         return remainder() + (q < 1 ? blamed_ * (1 + q) / (1 - q) : blamed_) +
-               (lingering_ > 0 ? interval_ / (1 - q) : 0);
+               (lingering_ > 0 ? interval_ / (1 - q) : 0) + 32 * longer_ +
+               (q < 1 ? (4 * surprise_ + unresolved()) / (1 - q) : 0);
     }
 
     /// Extrapolated time [s] from the last event to the limit of all; 0 if the intervals
@@ -187,6 +197,9 @@ public:
         visit(blamed_);
         visit(lingering_);
         visit(sunk_);
+        visit(longer_);
+        visit(since_longer_);
+        visit(surprise_);
         visit(low_);
         visit(jump_);
         visit(highest_jump_);
@@ -201,6 +214,12 @@ private:
     [[nodiscard]] double rise(double rate) const noexcept
     {
         return std::fabs(rate) * interval_ * ratio_ / 4;
+    }
+
+    /// What is left of the last interval that was one, once rounding decides [s].
+    [[nodiscard]] double unresolved() const noexcept
+    {
+        return stalled_ > most_at_once ? 8 * interval_ : sunk_ > 0 ? 2 * interval_ : 0;
     }
 
     [[nodiscard]] double resolution() const noexcept
@@ -225,6 +244,9 @@ private:
     double usual_ratio_ = 1;  ///< ratio of intervals before lateness mattered
     double late_ = 0;         ///< [s] error of the last event
     double blamed_ = 0;       ///< [s] sum of all such errors
+    double longer_ = 0;       ///< [s] a late interval that was longer than the one before it
+    double surprise_ = 0;     ///< [s] by which the last one differs from what earlier ones predict
+    std::uint32_t since_longer_ = 0;  ///< number of intervals since then
     std::uint32_t lingering_ = 0;
     std::uint32_t sunk_ = 0;
     bool low_ = false;

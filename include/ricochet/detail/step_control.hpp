@@ -3,12 +3,13 @@
 // Choice of the length of the next step.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+
+#include "ricochet/detail/arithmetic.hpp"
 
 namespace ricochet {
 
@@ -73,7 +74,7 @@ struct ErrorRule {
         const double root = order <= detail::InverseRoots::most_order
                                 ? detail::inverse_roots[static_cast<std::size_t>(order)](error)
                                 : std::pow(error, -1.0 / order);
-        return std::min(largest, std::max(smallest, safety * root));
+        return detail::least_of(largest, detail::greatest_of(smallest, safety * root));
     }
 };
 

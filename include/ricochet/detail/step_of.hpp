@@ -13,12 +13,12 @@
 // and errors of rounding do not grow with the number of steps.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <type_traits>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/flow_caller.hpp"
 #include "ricochet/detail/step_control.hpp"
 #include "ricochet/detail/stepper_door.hpp"
@@ -115,8 +115,9 @@ struct StepOf {
 
     /// Computes the departure w after a step of length s, with its rate there and the error
     /// estimate where the method has them. `kept` holds the stages, or a user-defined stepper.
-    template <bool with_error, class Kept>
-    [[gnu::always_inline]] static void depart(Caller& caller, Kept&& kept, double s, Values& of)
+    template <class Kept>
+    [[gnu::always_inline]] static void depart(Caller& caller, Kept&& kept, double s, Values& of,
+                                              [[maybe_unused]] bool with_error)
     {
         X& w = of.w;
         X& rate = of.w_rate;
@@ -156,21 +157,39 @@ struct StepOf {
             }
         };
         if constexpr (ours) {
-            RungeKutta<typename Stepper::Coefficients, X>::template depart<with_error>(
-                flow, of.zero, s, kept, {w, rate, error});
-        } else if constexpr (is_fsal<Stepper> && with_error) {
-            kept.do_step(flow, of.zero, of.zero, 0.0, w, rate, s, error);
-        } else if constexpr (is_fsal<Stepper>) {
-            kept.do_step(flow, of.zero, of.zero, 0.0, w, rate, s);
-        } else if constexpr (with_error) {
-            kept.do_step(flow, of.zero, of.zero, 0.0, w, s, error);
-        } else if constexpr (requires { kept.do_step(flow, w, w, 0.0, w, s); }) {
-            kept.do_step(flow, of.zero, of.zero, 0.0, w, s);
-        } else if constexpr (requires { kept.do_step(flow, w, 0.0, w, s); }) {
-            kept.do_step(flow, of.zero, 0.0, w, s);
+            using Ours = RungeKutta<typename Stepper::Coefficients, X>;
+            Ours::depart(flow, of.zero, s, kept, {w, rate, error}, with_error, Ours::inner_stages);
         } else {
-            w = of.zero;
-            kept.do_step(flow, w, 0.0, s);
+            depart_by_stepper(kept, flow, s, of, with_error);
+        }
+    }
+
+    template <class Flow>
+    [[gnu::always_inline]] static void depart_by_stepper(Stepper& stepper, const Flow& flow,
+                                                         double s, Values& of,
+                                                         [[maybe_unused]] bool with_error)
+    {
+        X& w = of.w;
+        const X& zero = of.zero;
+        if constexpr (has_error_estimate<Stepper>) {
+            if (with_error) {
+                if constexpr (is_fsal<Stepper>) {
+                    stepper.do_step(flow, zero, zero, 0.0, w, of.w_rate, s, of.error);
+                } else {
+                    stepper.do_step(flow, zero, zero, 0.0, w, s, of.error);
+                }
+                return;
+            }
+        }
+        if constexpr (is_fsal<Stepper>) {
+            stepper.do_step(flow, zero, zero, 0.0, w, of.w_rate, s);
+        } else if constexpr (requires { stepper.do_step(flow, w, w, 0.0, w, s); }) {
+            stepper.do_step(flow, zero, zero, 0.0, w, s);
+        } else if constexpr (requires { stepper.do_step(flow, w, 0.0, w, s); }) {
+            stepper.do_step(flow, zero, 0.0, w, s);
+        } else {
+            w = zero;
+            stepper.do_step(flow, w, 0.0, s);
         }
     }
 
@@ -255,8 +274,8 @@ struct StepOf {
     [[nodiscard, gnu::always_inline]] static double ratio_of(double error, double x0, double x1,
                                                              double rtol, double atol) noexcept
     {
-        const double size = std::max(std::fabs(x0), std::fabs(x1));
-        return std::fabs(error) * (1 / std::max(atol + rtol * size, least_tolerance));
+        const double size = greatest_of(std::fabs(x0), std::fabs(x1));
+        return std::fabs(error) * (1 / greatest_of(atol + rtol * size, least_tolerance));
     }
 
     /// @param atol  of a component

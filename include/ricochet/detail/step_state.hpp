@@ -7,7 +7,6 @@
 // whole step and a small state stays in registers from stage to stage.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +15,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/detail/host_step.hpp"
@@ -110,7 +110,7 @@ struct StepState {
     [[nodiscard]] double flow_time(double s) const noexcept { return flow_at(time(s)); }
     [[nodiscard]] double flow_at(double t) const noexcept
     {
-        return std::min(std::max(t, flow_from), flow_to);
+        return least_of(greatest_of(t, flow_from), flow_to);
     }
 };
 

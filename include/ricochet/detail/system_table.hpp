@@ -7,7 +7,6 @@
 // time they have the opposite sign.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +14,7 @@
 #include <span>
 #include <string>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/hybrid/guard.hpp"
@@ -85,6 +85,10 @@ struct SystemTable {
 
     double (*next_time_event)(Door, double t) = nullptr;
     double (*previous_time_event)(Door, double t) = nullptr;
+    /// Asked at the start and after every set instead of `next_time_event`; may answer t.
+    double (*next_time_event_at)(Door, Mode, double t, const X& x) = nullptr;
+    /// How often t is listed, for systems with `Times`; null for others.
+    std::size_t (*time_event_count)(Door, double t) = nullptr;
     Mode (*time_reset)(Door, Mode, double t, X& x) = nullptr;
 
     double (*lipschitz)(Door, std::size_t which) = nullptr;
@@ -94,7 +98,7 @@ struct SystemTable {
     double (*upper_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
 
     [[nodiscard]] bool resets() const noexcept { return reset || reset_set; }
-    [[nodiscard]] bool timed() const noexcept { return next_time_event; }
+    [[nodiscard]] bool timed() const noexcept { return next_time_event || next_time_event_at; }
 };
 
 /// The times between which the functions of a system may be called, and work space for a state.
@@ -111,8 +115,8 @@ struct RunSpan {
     /// An offset [s] of at most `length` such that twice the offset from t lies inside.
     [[nodiscard]] double inward(double t, double length) const noexcept
     {
-        return to - t >= t - from ? std::min(length, (to - t) / 2)
-                                  : -std::min(length, (t - from) / 2);
+        return to - t >= t - from ? least_of(length, (to - t) / 2)
+                                  : -least_of(length, (t - from) / 2);
     }
 };
 

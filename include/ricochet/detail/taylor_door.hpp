@@ -135,7 +135,8 @@ struct TaylorSizes<System, X, 0> {
 ///
 /// Operations that the compiler has read are unrolled by it. Where it cannot read them, where there
 /// are too many, or where those of the object differ from those of an object that is constructed by
-/// default, they are recorded here, once for each mode, and executed kind by kind.
+/// default, they are recorded here, once for each mode, and executed kind by kind. States in
+/// vectors may have another size in each mode, which is known when the mode is entered.
 template <class System, class X, std::size_t n>
 struct TaylorDoor : Door<System, X> {
     using Sizes = TaylorSizes<System, X, n>;
@@ -173,7 +174,7 @@ struct TaylorDoor : Door<System, X> {
             room.x = room.there = like;
             resize(static_cast<std::size_t>(like.size()));
         } else if constexpr (takes_series) {
-            if (!as_compiled_) record_known_modes(n);
+            if (!as_compiled_) record_all_modes();
         }
     }
 
@@ -191,8 +192,7 @@ struct TaylorDoor : Door<System, X> {
     void resize(std::size_t size) requires(n == 0)
     {
         step.resize(0, 0);  // until all is known, even if the flow throws
-        recorded_.clear();
-        if constexpr (takes_series) record_known_modes(size);
+        if constexpr (takes_series && !moded) static_cast<void>(recorded(0, size));
         room.w.assign(size, 0);
         room.rate.assign(size, 0);
         copy_state(room.w, room.x);
@@ -245,12 +245,12 @@ private:
 
     // --- operations that are recorded ---
 
-    /// Records known modes before the first step, so that errors are reported there.
-    void record_known_modes(std::size_t size)
+    /// Records the modes of arrays before the first step, so that errors are reported there.
+    void record_all_modes() requires(n > 0)
     {
         const std::size_t modes = moded ? mode_count_of(this->system()) : 1;
         for (std::size_t mode = 0; mode < modes; ++mode) {
-            static_cast<void>(recorded(static_cast<Mode>(mode), size));
+            static_cast<void>(recorded(static_cast<Mode>(mode), n));
         }
     }
 
@@ -269,10 +269,10 @@ private:
     {
         const std::size_t at = moded ? mode : 0;
         const auto found = recorded_.find(at);
-        if (found != recorded_.end()) return found->second;
+        if (found != recorded_.end() && found->second.states() == size) return found->second;
         LazyTape tape = record(mode, size);
         if (!tape.is_finite()) throw_constant_not_finite(name_of_system(this->system()));
-        return recorded_.emplace(at, std::move(tape)).first->second;
+        return recorded_.insert_or_assign(at, std::move(tape)).first->second;
     }
 
     [[nodiscard]] LazyTape record(Mode mode, std::size_t size) const
@@ -337,7 +337,7 @@ private:
 
     bool as_compiled_ = false;
     std::array<std::array<double, most_constants>, tapes> constants_{};
-    std::map<std::size_t, LazyTape> recorded_;  ///< by mode
+    std::map<std::size_t, LazyTape> recorded_;  ///< by mode, of its last size
 };
 
 }  // namespace ricochet::detail

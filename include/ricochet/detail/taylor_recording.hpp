@@ -491,6 +491,18 @@ concept ScalarGuards =
                                 " components, expected " + std::to_string(expected));
 }
 
+/// Whether a guard takes the states Xs of this mode. A guard that is not watched in it may be for
+/// vectors of another size.
+template <class Xs, class System>
+[[nodiscard]] constexpr bool fits_mode(const System& system, std::size_t which, Mode mode)
+{
+    if constexpr (requires { std::tuple_size<Xs>::value; }) {
+        return true;
+    } else {
+        return call_enabled_in(system, which, mode);
+    }
+}
+
 /// Records the flow of `system`, and its first guards, as many as there are outputs beyond the
 /// rates. The inputs are the components and the time, in this order; the outputs are the rates and
 /// the guards. `x` has the size of the state.
@@ -516,7 +528,9 @@ constexpr void record_into(const System& system, Mode mode, Recording& recording
     for (std::size_t i = 0; i < n; ++i) outputs[i] = index_of(dxdt[i]);
     if constexpr (ScalarGuardsOn<System, Xs>) {
         for (std::size_t i = 0; n + i < outputs.size(); ++i) {
-            outputs[n + i] = index_of(scalar_guard(system, i, mode, t, std::as_const(x)));
+            outputs[n + i] = fits_mode<Xs>(system, i, mode)
+                                 ? index_of(scalar_guard(system, i, mode, t, std::as_const(x)))
+                                 : index_of(Recorded(1.0));
         }
     }
 }

@@ -3,6 +3,7 @@
 // The table of functions of a user's inclusion, for solvers of N components and M reactions.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <string>
 

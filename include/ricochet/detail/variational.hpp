@@ -303,7 +303,15 @@ public:
         return next;
     }
 
-    [[nodiscard]] double next_time_event(double t) const requires Timed<System>
+    static_assert(!TimedByState<System, X>,
+                  "ricochet: found next_time_event([mode,] t, x) in a system whose derivatives are "
+                  "asked for; expected time events that do not depend on the state: "
+                  "next_time_event(t) or Times, or a guard");
+    [[nodiscard]] const Times& time_events() const requires detail::ListsTimes<System>
+    {
+        return detail::times_of(system());
+    }
+    [[nodiscard]] double next_time_event(double t) const requires detail::TimedByFunction<System>
     {
         return system().next_time_event(t);
     }

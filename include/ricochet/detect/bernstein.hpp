@@ -12,7 +12,6 @@
 // in order of time: a crossing, a touch, or neither.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>

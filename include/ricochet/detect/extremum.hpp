@@ -1,9 +1,9 @@
 // Detectors that sample a guard: at the ends of a step, and at its extremum inside.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detect/step_probe.hpp"
 
 namespace ricochet {
@@ -79,8 +79,8 @@ struct Extremum {
         const double b1 = sign * (start.value + slope0);
         const double b2 = sign * (end.value - slope1);
         const double v1 = sign * end.value;
-        const double lowest = std::min(std::min(b1, b2), v1);
-        const double highest = std::max(std::max(b1, b2), v1);
+        const double lowest = detail::least_of(detail::least_of(b1, b2), v1);
+        const double highest = detail::greatest_of(detail::greatest_of(b1, b2), v1);
         const bool turns = (sign * slope0 <= 0) & (sign * slope1 > 0);
         const bool clear = (v1 > 0) & (lowest > 0) & (!turns | (1.25 * lowest > highest));
         return !clear;

@@ -2,19 +2,19 @@
 // what it finds.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <concepts>
 #include <cstddef>
-#include <memory>
 #include <optional>
 #include <string_view>
 #include <utility>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/around.hpp"
 #include "ricochet/detail/features.hpp"
 #include "ricochet/detail/gate.hpp"
 #include "ricochet/detail/meter.hpp"
+#include "ricochet/detail/owner.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/nn/mlp.hpp"
@@ -62,7 +62,7 @@ void check_model_step(const Model& model, double smallest, double largest);
 
 /// Detector that evaluates a guard only after steps for which a network predicts an event. Nothing
 /// is proved: an event that the network does not predict is missed, or found late.
-class Network {
+class BareNetwork {
 public:
     static constexpr bool uses_rates = false;
     static constexpr Screening screening = Screening::ends;
@@ -72,7 +72,7 @@ public:
 
     /// @throws std::invalid_argument if the model names an unknown recipe or has
     /// more features than `max_features`.
-    explicit Network(Model model);
+    explicit BareNetwork(Model model);
 
     [[nodiscard]] const Model& model() const noexcept { return classifier_->model(); }
 
@@ -135,7 +135,7 @@ public:
     }
 
 private:
-    std::shared_ptr<const Classifier> classifier_;
+    detail::Shared<Classifier> classifier_;
     Recipe recipe_;
 };
 
@@ -160,12 +160,12 @@ public:
     static constexpr bool keeps_events = true;
 
     /// Takes the network that predicts and the exact detector that decides.
-    explicit Verified(Network network, const Exact& exact = {})
+    explicit Verified(BareNetwork network, const Exact& exact = {})
         : detail::Around<Exact>(exact), network_(std::move(network))
     {
     }
 
-    /// Checks the system like `Network::check`.
+    /// Checks the system like `BareNetwork::check`.
     template <class System, class X>
     void check(const System& system, const X& x, double smallest, double largest) const
     {
@@ -180,7 +180,7 @@ public:
     }
 
 private:
-    Network network_;
+    BareNetwork network_;
 };
 
 // Calibrated gates: checks deferred by the prediction of a network, without proof.
@@ -357,7 +357,7 @@ public:
     /// known recipe of features, or has too many features; or as `Planned`.
     explicit Certified(Model model, const PlannerOptions& options = {}, const Exact& exact = {})
         : Planned<Exact>(options, exact),
-          certified_(std::make_shared<const CertifiedClassifier>(std::move(model))),
+          certified_(detail::Shared<CertifiedClassifier>::make(std::move(model))),
           recipe_(gate_recipe(this->model().recipe))
     {
         detail::check_certified(this->model());
@@ -395,11 +395,11 @@ public:
         std::array<double, GateRecipe::most> features;
         recipe_.write(system, mode, t, x, features.data());
         if (!certified_->classifier().in_domain(features.data())) return {.outside = true};
-        return {.cleared = std::max(certified_->lower_bound(features.data()), 0.0)};
+        return {.cleared = detail::greatest_of(certified_->lower_bound(features.data()), 0.0)};
     }
 
 private:
-    std::shared_ptr<const CertifiedClassifier> certified_;
+    detail::Shared<CertifiedClassifier> certified_;
     GateRecipe recipe_;
 };
 

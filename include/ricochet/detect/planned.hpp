@@ -12,12 +12,12 @@
 // Lipschitz constant.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
 #include <utility>
 
+#include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/around.hpp"
 #include "ricochet/detail/debug_checks.hpp"
 #include "ricochet/detect/extremum.hpp"
@@ -67,7 +67,7 @@ struct GuardBound {
     if (a == 0) return from.speed * tau;
     const double gap = to.speed - from.speed;
     if (std::fabs(gap) >= a * tau) {
-        return std::min(from.speed, to.speed) * tau + 0.5 * a * tau * tau;
+        return detail::least_of(from.speed, to.speed) * tau + 0.5 * a * tau * tau;
     }
     const double middle = 0.5 * (from.speed + to.speed) * tau + 0.25 * a * tau * tau;
     return middle - 0.25 * gap * (gap / a);
@@ -94,7 +94,7 @@ struct GuardBound {
 [[nodiscard]] inline double time_to_check(const GuardBound& at, double slope) noexcept
 {
     if (!(at.distance > 0) || !at.sound()) return 0;
-    const double closing = std::max(at.speed - (std::isfinite(slope) ? slope : 0), 0.0);
+    const double closing = detail::greatest_of(at.speed - (std::isfinite(slope) ? slope : 0), 0.0);
     const double root = std::sqrt(closing * closing + 6 * at.acceleration * at.distance);
     return 4 * at.distance / (closing + root);
 }
@@ -105,8 +105,8 @@ struct GuardBound {
 // tells for how long no check is needed, for how long none is expected to be needed, and whether
 // two checks close the interval between them. The loop keeps the queue of deadlines: it continues
 // without a check while every guard is covered, tentatively while an interval is expected to be
-// closed, and returns to the first step that could not be closed, which the exact detector then
-// examines. The steps are those of a run in which every step is checked.
+// closed, and returns to the first step that could not be closed, which is then divided, and
+// examined. The steps are those of a run in which every step is checked.
 //
 //     Planned      by declared bounds (hybrid/bounds.hpp); the events are those of the exact
 //                  detector, bit for bit, and what is skipped is `proved`
@@ -170,11 +170,11 @@ public:
 ///     when two values are expected to cover the interval: check its end
 ///         covered: the interval is closed; its steps stand
 ///         else:    halve it at the kept starts; the first single step that is not covered is
-///                  taken again, and examined by `Exact`
+///                  divided on its polynomial, and what stays open is left to `Exact`
 ///
 /// The cover by two values holds because a guard that reaches its surface has to return from it.
-/// The events are those of `Exact` at every step, bit for bit, as long as the bounds are true; a
-/// bound that is found to be wrong ends the run as `Outcome::wrong_bound`.
+/// As long as the bounds are true, the events are those of `Exact` at every step, bit for bit, and
+/// those that it loses inside steps; a wrong bound that is found ends the run as `wrong_bound`.
 template <class Exact = Extremum>
 class Planned : public detail::PutsOff<Exact> {
 public:
@@ -277,7 +277,7 @@ public:
     [[nodiscard]] double hoped(const GuardBound& at, double slope, double) const noexcept
     {
         if (!std::isfinite(slope)) return 0;
-        return std::max(fraction_ * at.distance / std::fabs(slope), 0.0);
+        return detail::greatest_of(fraction_ * at.distance / std::fabs(slope), 0.0);
     }
     [[nodiscard]] static bool closes(const GuardBound& from, const GuardBound& to, double,
                                      double band) noexcept
@@ -295,7 +295,7 @@ template <class Detector, class System, class X>
 [[nodiscard]] constexpr bool defers_checks() noexcept
 {
     if constexpr (Guarded<System, X> && requires { Detector::defers; }) {
-        return !Detector::needs_bounds || Bounded<System, X>;
+        return !Detector::needs_bounds || BoundedGuards<System, X>;
     } else {
         return false;
     }

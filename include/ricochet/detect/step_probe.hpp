@@ -15,7 +15,6 @@
 // its steps in this form and use the detectors and locators without our loop.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <concepts>
 #include <limits>
@@ -84,7 +83,8 @@ struct Location {
 /// doubles, or a millionth of their spacing at the end of the step.
 [[nodiscard]] inline double finest_bracket(double s, double h) noexcept
 {
-    return std::numeric_limits<double>::epsilon() * std::max(std::fabs(s), 0x1p-20 * std::fabs(h));
+    return std::numeric_limits<double>::epsilon() *
+           detail::greatest_of(std::fabs(s), 0x1p-20 * std::fabs(h));
 }
 
 /// Largest fraction of a step over which the flow may be extrapolated: its square is 9e-16.

@@ -26,6 +26,7 @@
 #include <concepts>
 #include <cstddef>
 
+#include "ricochet/detail/declarations.hpp"
 #include "ricochet/hybrid/system.hpp"
 
 namespace ricochet {
@@ -72,7 +73,7 @@ concept HasUpperBound = requires(const System& s, double t, const X& x) { { s.up
 
 /// A system that bounds how fast its guards change.
 template <class System, class X>
-concept Bounded = Guarded<System, X> && detail::HasSpeedBound<System, X>;
+concept BoundedGuards = Guarded<System, X> && detail::HasSpeedBound<System, X>;
 
 namespace detail {
 
@@ -125,17 +126,28 @@ template <class System, class X>
 template <class System, class X>
 constexpr void check_bound_declarations()
 {
+#define RICOCHET_IN_ORDER(name)                                                                      \
+    static_assert(!CountsGuards<System> ||                                                           \
+                      requires(const System& s, Only<std::size_t> which, Only<Mode> mode, double t, const X& x) { s.name(which, mode, t, x); } || \
+                      !requires(const System& s, Only<std::size_t> which, Only<Mode> mode, double t, const X& x) { s.name(mode, which, t, x); }, \
+                  "ricochet: found a " #name " that takes the Mode before the number of the guard; "   \
+                  "expected double " #name "([which,] [Mode,] double t, const State& x) const");
+    RICOCHET_IN_ORDER(speed_bound)
+    RICOCHET_IN_ORDER(acceleration_bound)
+    RICOCHET_IN_ORDER(lower_bound)
+    RICOCHET_IN_ORDER(upper_bound)
+#undef RICOCHET_IN_ORDER
     if constexpr (requires { &System::speed_bound; }) {
-        static_assert(Bounded<System, X>, "ricochet: speed_bound must be callable as speed_bound([which,] [mode,] double t, const State& x) on a const system and return a number, and needs a guard");
+        static_assert(BoundedGuards<System, X>, "ricochet: speed_bound must be callable as speed_bound([which,] [mode,] double t, const State& x) on a const system and return a number, and needs a guard");
     }
     if constexpr (requires { &System::acceleration_bound; }) {
-        static_assert(HasAccelerationBound<System, X> && Bounded<System, X>, "ricochet: acceleration_bound must be callable as acceleration_bound([which,] [mode,] double t, const State& x) on a const system, and needs a speed_bound");
+        static_assert(HasAccelerationBound<System, X> && BoundedGuards<System, X>, "ricochet: acceleration_bound must be callable as acceleration_bound([which,] [mode,] double t, const State& x) on a const system, and needs a speed_bound");
     }
     if constexpr (requires { &System::lower_bound; }) {
-        static_assert(HasLowerBound<System, X> && Bounded<System, X>, "ricochet: lower_bound must be callable as lower_bound([which,] [mode,] double t, const State& x) on a const system, and needs a speed_bound");
+        static_assert(HasLowerBound<System, X> && BoundedGuards<System, X>, "ricochet: lower_bound must be callable as lower_bound([which,] [mode,] double t, const State& x) on a const system, and needs a speed_bound");
     }
     if constexpr (requires { &System::upper_bound; }) {
-        static_assert(HasUpperBound<System, X> && Bounded<System, X>, "ricochet: upper_bound must be callable as upper_bound([which,] [mode,] double t, const State& x) on a const system, and needs a speed_bound");
+        static_assert(HasUpperBound<System, X> && BoundedGuards<System, X>, "ricochet: upper_bound must be callable as upper_bound([which,] [mode,] double t, const State& x) on a const system, and needs a speed_bound");
     }
 }
 

@@ -43,6 +43,7 @@
 #include <utility>
 
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/declarations.hpp"
 #include "ricochet/detail/filippov_decision.hpp"
 #include "ricochet/detail/filippov_motion.hpp"
 #include "ricochet/detail/filippov_rates.hpp"
@@ -291,15 +292,27 @@ public:
 
     // --- time events of the fields ---
 
-    [[nodiscard]] double next_time_event(double t) const requires Timed<Fields>
+    [[nodiscard]] double next_time_event(double t) const requires detail::TimedByFunction<Fields>
     {
         return fields().next_time_event(t);
+    }
+    /// The list or the clock of the fields.
+    [[nodiscard]] const Times& time_events() const requires detail::ListsTimes<Fields>
+    {
+        return detail::times_of(fields());
+    }
+    template <StateVector X>
+    [[nodiscard]] double next_time_event(double t,
+                                         const X& x) const requires detail::PlainTimer<Fields, X>
+    {
+        return fields().next_time_event(t, x);
     }
 
     /// Applies the jump of the fields' own `time_reset`, if any. Fields may also have changed:
     /// the sliding surfaces are decided again.
     template <StateVector X>
-    [[nodiscard]] Mode time_reset(Mode mode, double t, X& x) const requires Timed<Fields>
+    [[nodiscard]] Mode time_reset(Mode mode, double t,
+                                  X& x) const requires Timed<Fields> || TimedByState<Fields, X>
     {
         const Places from = after_time_event(places(mode), t, x);
         return number(rules_.decide(from, Rules::sliding_in(from), t, x));
@@ -309,7 +322,7 @@ public:
 
     /// The mode in which a run from (t, x) starts. A surface counts as met where
     /// |h| <= tolerance, in the unit of h; then the rule of `reset` applies.
-    template <StateVector X>
+    template <StateVector X = detail::DeclaredState<Fields>>
     [[nodiscard]] Mode start_mode(double t, const X& x, double tolerance = 0) const
     {
         Places at{};
@@ -325,7 +338,7 @@ public:
     /// Type of the meeting of the fields on either side of surface `which` at a point (t, x) of
     /// it. The other surface is where `mode` says; if the motion slides there, sliding motions
     /// replace the fields.
-    template <StateVector X>
+    template <StateVector X = detail::DeclaredState<Fields>>
     [[nodiscard]] Meeting meeting(std::size_t which, Mode mode, double t, const X& x) const
     {
         return rules_.meeting(which, places(mode), t, x);
@@ -334,7 +347,7 @@ public:
     /// Weight a in [0, 1] of the field above in the motion, for each surface: 0 below,
     /// 1 above. While sliding it is the average of the switching, such as the force of sticking
     /// friction as a fraction of its bounds.
-    template <StateVector X>
+    template <StateVector X = detail::DeclaredState<Fields>>
     [[nodiscard]] std::array<double, surface_count> shares(Mode mode, double t, const X& x) const
     {
         const detail::Shares shares = rules_.shares_in(places(mode), t, x);

@@ -54,6 +54,10 @@ struct GuardInfo {
     int degree = 0;                ///< a polynomial of this degree in (t, x) together; 0: unknown
     double touch = 0;              ///< |g| up to which a zero of the rate is a touch; at least
                                    ///< 64 units in the last place of the guard's size
+    /// It fires at the start of a run, and where its mode begins by a change of mode, if it is
+    /// beyond its surface there, or on it and does not move inside. Not for `Crossing::either`.
+    bool at_start = false;
+    bool at_entry = false;
 };
 
 /// The side that a value lies on; plateau for zero.

@@ -39,9 +39,14 @@
 //
 // Events at known times:
 //
-//     next_time_event(t)        the first after t (not t itself), or infinity
+//     Times time_events         a list, or a clock: hybrid/times.hpp
+//     next_time_event(t)        or: the first after t (not t itself), or infinity
 //     previous_time_event(t)    the last before t, for runs backward in time
+//     next_time_event(t, x)     or: of timers in the state; t or later, or infinity. Asked at the
+//                               start and after every set of events
 //     time_reset(t, x)          or Mode time_reset(mode, t, x); optional
+//
+// A reset or time_reset may end the run: throw ricochet::Stop("why"), see hybrid/stop.hpp.
 //
 // Bounds on how fast its guards can change, which let a detector skip most evaluations:
 // speed_bound and others, see hybrid/bounds.hpp.
@@ -65,6 +70,8 @@
 #include "ricochet/detail/dual_rate.hpp"
 #include "ricochet/detail/counts.hpp"
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/stop.hpp"
+#include "ricochet/hybrid/times.hpp"
 
 namespace ricochet {
 
@@ -303,6 +310,35 @@ concept TimedBackward = requires(const System& system, double t) {
     { system.previous_time_event(t) } -> std::convertible_to<double>;
 };
 
+template <class System>
+concept TimedByFunction = requires(const System& system, double t) {
+    { system.next_time_event(t) } -> std::convertible_to<double>;
+};
+
+template <class System>
+concept ListsTimesAsMember = requires(const System& system) {
+    { system.time_events } -> std::same_as<const Times&>;
+};
+
+template <class System>
+concept ListsTimesByCall = requires(const System& system) {
+    { system.time_events() } -> std::same_as<const Times&>;
+};
+
+/// A system whose time events are `Times`.
+template <class System>
+concept ListsTimes = ListsTimesAsMember<System> || ListsTimesByCall<System>;
+
+template <class System, class X>
+concept ModedTimer = requires(const System& system, Mode mode, double t, const X& x) {
+    { system.next_time_event(mode, t, x) } -> std::convertible_to<double>;
+};
+
+template <class System, class X>
+concept PlainTimer = requires(const System& system, double t, const X& x) {
+    { system.next_time_event(t, x) } -> std::convertible_to<double>;
+};
+
 template <class System, class X>
 concept TimeResetting = requires(const System& system, Mode mode, double t, X& x) { { system.time_reset(mode, t, x) } -> std::convertible_to<Mode>; } ||
     requires(const System& system, double t, X& x) { system.time_reset(t, x); };
@@ -329,11 +365,13 @@ concept Resetting = Guarded<System, X> && (detail::ResetsAlone<System, X> || det
 template <class System, class X>
 concept Resting = Guarded<System, X> && (detail::ModedRestOf<System, X> || detail::PlainRestOf<System, X> || detail::ModedSingleRest<System, X> || detail::PlainSingleRest<System, X>);
 
-/// A system with time events.
+/// A system with time events that are known beforehand.
 template <class System>
-concept Timed = requires(const System& system, double t) {
-    { system.next_time_event(t) } -> std::convertible_to<double>;
-};
+concept Timed = detail::TimedByFunction<System> || detail::ListsTimes<System>;
+
+/// A system whose next time event depends on its state.
+template <class System, class X>
+concept TimedByState = detail::ModedTimer<System, X> || detail::PlainTimer<System, X>;
 
 /// A system with modes: at least one of its functions takes a mode.
 template <class System, class X>
@@ -532,6 +570,37 @@ template <class System, class X>
     } else {
         system.rest(t, x);
         return mode;
+    }
+}
+
+template <class System>
+[[nodiscard]] const Times& times_of(const System& system)
+{
+    if constexpr (ListsTimesAsMember<System>) {
+        return system.time_events;
+    } else {
+        return system.time_events();
+    }
+}
+
+/// The first time event after t, whichever way the system declares it.
+template <class System>
+[[nodiscard]] double call_next_time_event(const System& system, double t)
+{
+    if constexpr (ListsTimes<System>) {
+        return times_of(system).next(t);
+    } else {
+        return system.next_time_event(t);
+    }
+}
+
+template <class System, class X>
+[[nodiscard]] double call_timer(const System& system, [[maybe_unused]] Mode mode, double t, const X& x)
+{
+    if constexpr (ModedTimer<System, X>) {
+        return system.next_time_event(mode, t, x);
+    } else {
+        return system.next_time_event(t, x);
     }
 }
 

@@ -25,7 +25,8 @@ concept WantsHandOver = requires(const System& system)
 /// @param x0       initial state; its type is the state type of the run
 /// @param options  only `t_end` is required
 /// @param stepping `ErrorControlled<Method>` or `FixedStep<Method>`
-/// @param detector `Extremum`, `Ends`, `Bernstein`, a `Network`, or a detector that wraps one of
+/// @param detector `Extremum`, `Ends`, `Bernstein`, a `BareNetwork`, or a detector that wraps one
+/// of
 ///                 the exact ones, such as `Planned` or `Verified`
 /// @param locator  `Newton`, `Bisection` or `Toms748`
 /// @throws std::invalid_argument for invalid options, start or guards.
@@ -50,41 +51,13 @@ requires Flowing<System, X> && StateVector<X>
 template <class System, class X>
 concept NotIntegrable = !(Flowing<System, X> && StateVector<X>);
 
-namespace detail {
-
-/// Whether the flow fits the state type that the system declares, but not the type of the start.
-template <class System, class X>
-[[nodiscard]] consteval bool takes_another_state()
-{
-    if constexpr (requires { typename System::State; }) {
-        return !std::is_same_v<X, typename System::State> &&
-               Flowing<System, typename System::State>;
-    } else {
-        return false;
-    }
-}
-
-}  // namespace detail
-
 /// Rejects at compile time a system that cannot be integrated, with a sentence instead of a list of
 /// concepts.
 template <class System, class X = typename System::State, class... Choices>
 requires NotIntegrable<System, X> Run<X> integrate(const System&, const X&, const Options&,
                                                    const Choices&...)
 {
-    static_assert(StateVector<X>,
-                  "ricochet: found a start that is no state; expected std::array, std::vector or a "
-                  "vector of Eigen, of double");
-    if constexpr (detail::takes_another_state<System, X>()) {
-        static_assert(detail::never<System>,
-                      "ricochet: found a start of another type than System::State, which is what "
-                      "the flow takes");
-    } else if constexpr (StateVector<X>) {
-        static_assert(detail::check_declarations<System, X>());
-        static_assert(detail::flow_declaration<System, X>() != detail::Declaration::absent,
-                      "ricochet: found no flow that fits the state; expected void flow([Mode,] "
-                      "double t, const State& x, State& dxdt) const");
-    }
+    static_assert(detail::check_system<System, X>());
     return {};
 }
 

@@ -15,8 +15,13 @@ namespace ricochet {
 /// in time applies resets as they are, not inverted.
 struct Options {
     double t_start = 0;
-    double t_end = std::numeric_limits<double>::quiet_NaN();  ///< before t_start: runs backward
-    Mode mode = 0;                                            ///< mode at the start
+    /// Before t_start: runs backward. Infinite where something else ends the run: a guard with
+    /// `stop_after`, `stop_at_event`, `max_steps` or `cancelled`.
+    double t_end = std::numeric_limits<double>::quiet_NaN();
+    Mode mode = 0;  ///< mode at the start
+    /// The run goes on where another has ended: t_start belongs to that one, so that nothing
+    /// happens there by `Times` of the system or by `GuardInfo::at_start`.
+    bool continues = false;
 
     /// [s] Length of the steps of a fixed-step run, where it is required; with error control the
     /// length of the first step tried, estimated from the flow if zero.
@@ -59,10 +64,11 @@ struct Options {
 
     std::uint64_t max_steps = std::numeric_limits<std::uint64_t>::max();
 
-    /// Number of consecutive steps that together have to advance the time by 1e-9 of the span from
-    /// t_start to t_end; else the run ends as `Outcome::stalled`. With `max_steps`, 20 000 of
-    /// them (or `stall_steps`, if less) without an event also have to advance it at a pace at which
-    /// a hundred times `max_steps` would reach t_end. 0: no limit.
+    /// Number of consecutive steps, ten for an instant with events, that have to advance the time
+    /// by 1e-9 of the span; else the run ends as `Outcome::stalled`. With `max_steps`, 20 000 steps
+    /// (or `stall_steps`, if less) without an event also have to go at a pace at which a hundred
+    /// times `max_steps` would reach t_end. Not while the pace is that of the run so far. 0: no
+    /// limit.
     std::uint64_t stall_steps = 1'000'000;
 
     /// Flag, set from another thread or a signal handler, that ends the run after the step in
@@ -73,5 +79,12 @@ struct Options {
 /// @throws std::invalid_argument beginning with `who` and naming the option, what was given and
 /// what was expected.
 void validate(const Options& options, bool step_required, std::string_view who = "integrate");
+
+namespace detail {
+
+/// The same, where an infinite t_end is examined later.
+void validate_but_for_end(const Options& options, bool step_required, std::string_view who);
+
+}  // namespace detail
 
 }  // namespace ricochet

@@ -2,13 +2,13 @@
 // goes on.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -111,8 +111,23 @@ struct Statistics {
     /// Events whose reset returned its mode and left the state alone, with a mode also when it was
     /// asked again beyond the surface.
     std::uint64_t ineffective_resets = 0;
+    /// The guard of the last of them in a system with modes, whose reset was asked twice.
+    std::size_t declined_guard = no_guard;
+    /// Events of guards with `Crossing::either` from which another mode turns the motion back. A
+    /// guard with a direction would fire again there.
+    std::uint64_t either_relays = 0;
+    std::size_t relay_guard = no_guard;  ///< the guard of the last of them
+    /// State-changing or terminal guards that were beyond their surface where they were armed: at
+    /// the start, or by a mode that enabled them. They wait until they have returned.
+    std::uint64_t armed_beyond = 0;
     EvidenceCounts evidence;
 };
+
+/// Describes what an outcome does not say, in a sentence each: resets that declined, and relays by
+/// guards with `Crossing::either`. Empty if there are none.
+/// @param guard_names  what the guards are called; others go by their numbers
+[[nodiscard]] std::string describe(const Statistics& statistics,
+                                   std::span<const std::string> guard_names = {});
 
 // The whole solution, for evaluation at any time after the run.
 
@@ -164,8 +179,8 @@ public:
             visit(piece.departures);
             visit(piece.slopes);
             piece.nodes = static_cast<DenseNodes>(nodes);
-            piece.departures = std::min<std::size_t>(piece.departures, 3);
-            piece.slopes = std::min(piece.slopes, piece.departures);
+            piece.departures = detail::least_of<std::size_t>(piece.departures, 3);
+            piece.slopes = detail::least_of(piece.slopes, piece.departures);
             for (State* x : {&piece.x0, &piece.remainder, &piece.rate0}) visit.state(*x);
             for (std::size_t k = 0; k < piece.departures; ++k) visit.state(piece.w[k]);
             for (std::size_t k = 0; k < piece.slopes; ++k) visit.state(piece.slope[k]);
@@ -249,7 +264,7 @@ public:
         while (!pieces_.empty() && offset(pieces_.back(), t) <= 0) pieces_.pop_back();
         if (pieces_.empty()) return;
         Piece& last = pieces_.back();
-        last.length = std::min(last.length, offset(last, t));
+        last.length = detail::least_of(last.length, offset(last, t));
     }
 
     /// Keeps only the first `size` steps.
@@ -283,9 +298,12 @@ private:
     /// The last piece that starts at or before t.
     [[nodiscard]] std::size_t after(double t) const noexcept
     {
-        const auto later = [](double time, const Piece& piece) { return offset(piece, time) < 0; };
-        const auto it = std::upper_bound(pieces_.begin(), pieces_.end(), t, later);
-        return it == pieces_.begin() ? 0 : static_cast<std::size_t>(it - pieces_.begin()) - 1;
+        std::size_t first = 0, end = pieces_.size();
+        while (end - first > 1) {
+            const std::size_t middle = first + (end - first) / 2;
+            (offset(pieces_[middle], t) < 0 ? end : first) = middle;
+        }
+        return first;
     }
 
     [[nodiscard]] static State evaluate(const Piece& piece, double t)
@@ -305,7 +323,7 @@ private:
         if (const auto n = static_cast<std::size_t>(x.size()); piece.series.size() >= 2 * n) {
             parts.series = {piece.series.data(), static_cast<int>(piece.series.size() / n) - 1, n};
         }
-        const double s = std::clamp(offset(piece, t), 0.0, piece.length);
+        const double s = detail::least_of(detail::greatest_of(offset(piece, t), 0.0), piece.length);
         if (s > 0) {
             const DenseView<State, false> view(parts, s);
             detail::for_each_component(x, [&](auto i) { x[i] = view[i]; });
@@ -348,17 +366,34 @@ struct Run {
     double t = 0;  ///< [s] time reached
     State x{};     ///< state at that time
     Mode mode = 0;
-    /// The guard that ended the run, or `no_guard` if none did; of two conflicting
-    /// resets the first, with the second in `other_guard`, which is `time_event_reset` for a time
-    /// event's reset.
+    /// The guard that ended the run, or `no_guard` if none did. `other_guard` is the second of two
+    /// conflicting resets, `time_event_reset` for that of a time event, or, with `zeno`, another
+    /// guard of the cycle that accumulates.
     std::size_t guard = no_guard;
     std::size_t other_guard = no_guard;
+    std::string reason;                     ///< text of the `Stop` that ended the run
+    std::vector<std::size_t> armed_beyond;  ///< guards that `Statistics::armed_beyond` counts
     std::vector<Event<State>> events;
     Trajectory<State> trajectory;  ///< empty unless `Options::sample_times` were given
     Solution<State> solution;      ///< empty without `Options::record_steps`
     std::optional<WrongBound<State>> wrong_bound;  ///< set with `Outcome::wrong_bound`
     Statistics statistics;
 };
+
+namespace detail {
+
+[[nodiscard]] std::string describe_run(Outcome outcome, const std::string& reason,
+                                       const std::vector<std::size_t>& armed_beyond);
+
+}  // namespace detail
+
+/// A sentence about the outcome, with the text of the reset that has ended the run, and one about
+/// guards that were armed beyond their surface.
+template <class State>
+[[nodiscard]] std::string describe(const Run<State>& run)
+{
+    return detail::describe_run(run.outcome, run.reason, run.armed_beyond);
+}
 
 // A saved run: everything that its future depends on, as numbers, and the identity of the run.
 
@@ -388,6 +423,14 @@ struct Snapshot {
 [[nodiscard]] Snapshot snapshot_from_text(std::string_view text);
 
 namespace detail {
+
+/// Makes room for one event more, without much memory where there are few.
+template <class State>
+void make_room(std::vector<Event<State>>& events)
+{
+    if (events.size() < events.capacity() || events.size() > 4) return;
+    events.reserve(events.empty() ? 4 : 16);
+}
 
 /// @throws std::invalid_argument because the snapshot does not fit the simulation.
 [[noreturn]] void throw_snapshot_does_not_fit();

@@ -15,7 +15,6 @@
 
 #include <array>
 #include <cstddef>
-#include <memory>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -24,6 +23,7 @@
 #include "ricochet/detail/declarations.hpp"
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/kernels.hpp"
+#include "ricochet/detail/owner.hpp"
 #include "ricochet/detect/extremum.hpp"
 #include "ricochet/hybrid/bounds.hpp"
 #include "ricochet/hybrid/system.hpp"
@@ -48,7 +48,11 @@ class PartsOfRun {
     static constexpr bool error_controlled = std::is_same_v<Stepping, ErrorControlled<Method>>;
     static constexpr bool by_name = std::is_same_v<Method, MethodByName>;
 
-    static_assert(check_declarations<System, X>());
+    static_assert([] {
+        // A system without a flow has been refused already.
+        if constexpr (Flowing<System, X> && StateVector<X>) return check_declarations<System, X>();
+        return true;
+    }());
 
     [[nodiscard]] static constexpr bool estimates_error() noexcept
     {
@@ -176,6 +180,8 @@ void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
     to.mode = run.mode;
     to.guard = run.guard;
     to.other_guard = run.other_guard;
+    to.reason = run.reason;
+    to.armed_beyond = run.armed_beyond;
     to.statistics = run.statistics;
     drop_beyond(to, run.events.size(), run.trajectory.x.size(), run.solution.size());
     if (to.events.empty()) to.events.reserve(run.events.size());
@@ -236,8 +242,12 @@ template <class X>
 void add_event(void* events, const Event<CoreState<X>>& event)
 {
     auto& all = *static_cast<std::vector<Event<X>>*>(events);
-    if (all.empty()) all.reserve(16);  // most runs have no more events
-    all.push_back(as_callers(event, X{}));
+    struct Converted {
+        const Event<CoreState<X>>& event;
+        operator Event<X>() const { return as_callers(event, X{}); }
+    };
+    make_room(all);
+    all.emplace_back(Converted{event});  // in its place, without a copy
 }
 
 /// The whole run of a set-up.
@@ -250,7 +260,10 @@ template <class X>
         setup.add_event = &add_event<X>;
         setup.events = &events;
         Run<X> out;
-        update(out, run_whole(setup, core_state(x0), options), x0);
+        const auto take = [](void* to, const Run<SmallState>& run) {
+            update(*static_cast<Run<X>*>(to), run, X{});
+        };
+        run_whole<SmallState>(setup, core_state(x0), options, take, &out);
         out.events = std::move(events);
         return out;
     } else {
@@ -295,26 +308,51 @@ template <class X>
 /// the end of its last complete step with its events (in `take`: or at the start of the steps
 /// without events that led there), and the next call continues with the bits of a run in which
 /// nothing was thrown.
-template <class System, class X, class Stepping = ErrorControlled<Dopri5>,
-          class Detector = Extremum, class Locator = Newton>
-requires Flowing<System, X> && StateVector<X>
+template <class System, class X = detail::DeclaredState<System>,
+          class Stepping = ErrorControlled<Dopri5>, class Detector = Extremum,
+          class Locator = Newton>
 class Simulation {
+    static_assert(detail::check_system<System, X>());
     using Parts = detail::PartsOfRun<System, X, Stepping, Detector, Locator>;
     using C = detail::CoreState<X>;
     static constexpr bool same = std::is_same_v<X, C>;
 
 public:
-    /// Prepares a run with the arguments and errors of `integrate`. Keeps a reference to `system`.
+    /// Prepares a run with the arguments and errors of `integrate`. Keeps a reference to `system`,
+    /// and a temporary one itself.
     Simulation(const System& system, const X& x0, const Options& options,
                const Stepping& stepping = {}, const Detector& detector = {},
                const Locator& locator = {})
-        : parts_(std::make_unique<Parts>(system, x0, stepping, detector, locator)),
+        : parts_(new Parts(system, x0, stepping, detector, locator)),
           loop_(detail::make_loop(parts_->setup(), detail::core_state(x0), options)),
           shown_(x0)
     {
     }
-    Simulation(System&&, const X&, const Options&, const Stepping& = {}, const Detector& = {},
-               const Locator& = {}) = delete;
+    Simulation(System&& system, const X& x0, const Options& options, const Stepping& stepping = {},
+               const Detector& detector = {}, const Locator& locator = {})
+        : Simulation(detail::Owner<const System>(new System(std::move(system))), x0, options,
+                     stepping, detector, locator)
+    {
+    }
+    /// {10, 0, 1} for two components, or {10}, where the others would silently be zero.
+    template <std::size_t given>
+    requires(detail::fixed_size<X>() > 0 && detail::fixed_size<X>() != given)
+        Simulation(const System&, const double (&)[given], const Options&, const Stepping& = {},
+                   const Detector& = {}, const Locator& = {})
+        : shown_(X{})
+    {
+        static_assert(
+            given == detail::fixed_size<X>(),
+            "ricochet: found a start with another number of components than System::State");
+    }
+    template <std::size_t given>
+    requires(detail::fixed_size<X>() > 0 && detail::fixed_size<X>() != given)
+        Simulation(System&& system, const double (&x0)[given], const Options& options,
+                   const Stepping& stepping = {}, const Detector& detector = {},
+                   const Locator& locator = {})
+        : Simulation(std::as_const(system), x0, options, stepping, detector, locator)
+    {
+    }
 
     [[nodiscard]] double t() const noexcept { return loop_->t(); }  ///< [s]
     [[nodiscard]] const X& x() const noexcept
@@ -437,6 +475,13 @@ public:
     }
 
 private:
+    Simulation(detail::Owner<const System> system, const X& x0, const Options& options,
+               const Stepping& stepping, const Detector& detector, const Locator& locator)
+        : Simulation(*system, x0, options, stepping, detector, locator)
+    {
+        own_ = std::move(system);
+    }
+
     /// Result of a run with states of another type than the loop's.
     struct Shown {
         explicit Shown(const X& like) : x(like) {}
@@ -464,8 +509,9 @@ private:
         }
     }
 
-    std::unique_ptr<Parts> parts_;
-    std::unique_ptr<detail::AnyLoop<C>> loop_;
+    detail::Owner<const System> own_;  ///< where it was a temporary
+    detail::Owner<Parts> parts_;
+    detail::Owner<detail::AnyLoop<C>> loop_;
     mutable Shown shown_;
 };
 

@@ -100,8 +100,9 @@ struct Rival {
     std::uint64_t events = 0;  ///< number of events found
 };
 
-/// One sentence that names the fastest rival and the cost of the last one, the network; empty
-/// without rivals. The first rival is `Extremum` at every step.
+/// One sentence that says whether the network, the last rival, is the fastest of those that lose no
+/// more events than the network, and else from which price of a guard call on; empty without
+/// rivals. The first rival is `Extremum` at every step.
 [[nodiscard]] std::string describe(const std::vector<Rival>& rivals);
 
 /// Receives the progress; returns false to stop the training, whose best weights are kept.

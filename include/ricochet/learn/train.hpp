@@ -66,7 +66,7 @@ template <class System, class X, class Stepping>
     runs.announce();
     if (runs.stopped()) return stop();
     if (training.kind == GateKind::level) {
-        if constexpr (Bounded<System, X>) {
+        if constexpr (BoundedGuards<System, X>) {
             runs.check_bounds(20'000, training.seed + 5'000'003);
         } else {
             detail::throw_no_bounds();
@@ -114,7 +114,7 @@ template <class System, class X, class Stepping>
     };
     if (training.kind == GateKind::horizon) {
         try_out(Calibrated(gate));
-    } else if constexpr (Bounded<System, X>) {
+    } else if constexpr (BoundedGuards<System, X>) {
         try_out(CalibratedBounds(gate));
     }
     if (runs.stopped()) return stop();
@@ -140,7 +140,7 @@ template <class System, class X, class Stepping>
 //         learn::train_classifier(system, starts, FixedStep<Rk4>{}, {}, training);
 //     if (trained.misses_none()) store_model(path, trained.model);
 //     std::puts(trained.trial.describe().c_str());
-//     integrate(system, x0, options, FixedStep<Rk4>{}, Network(trained.model));
+//     integrate(system, x0, options, FixedStep<Rk4>{}, BareNetwork(trained.model));
 //
 // Saunders, Steyer and Kuether (SAND2023-06682C, eqs. 4 to 6) sample a known event surface; here it
 // is sampled by the events of runs. From these, states are traced backward in time and labelled by
@@ -413,8 +413,8 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
             asked(surface.size());
             const RunStart<X> from = start(random);
             const std::size_t components = static_cast<std::size_t>(from.x.size());
-            if (components > Network::max_features) {
-                detail::throw_too_many_components(components, Network::max_features);
+            if (components > BareNetwork::max_features) {
+                detail::throw_too_many_components(components, BareNetwork::max_features);
             }
             Simulation run(system, from.x, run_options, FixedStep<Method>{});
             double last = from.t;
@@ -493,7 +493,7 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
             out.report.outcome = TrainingOutcome::misses_remain;
         }
 
-        const Network network(out.model);
+        const BareNetwork network(out.model);
         Random random(training.seed + 2'000'003);
         asked.begin("comparing", training.trial_events, 1);
         const auto time = [](double& seconds, const auto& run) {
@@ -523,7 +523,7 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
                                            : 0;
             trial.missed += std::max(late, lost);
         }
-        detail::RivalRuns<System, X, FixedStep<Method>, Network> rivals(system, network);
+        detail::RivalRuns<System, X, FixedStep<Method>, BareNetwork> rivals(system, network);
         while (rivals.events() < std::min<std::uint64_t>(trial.events, 200)) {
             asked(trial.events);
             const X x0 = start(random).x;

@@ -5,13 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "ricochet/detail/owner.hpp"
 #include "ricochet/detail/pack.hpp"
 #include "ricochet/nn/model.hpp"
 
@@ -97,7 +97,7 @@ public:
 private:
     detail::Network<T> network_;
     detail::Kernel<T> kernel_;
-    std::shared_ptr<const void> memory_;
+    detail::Shared<void> memory_;
 };
 
 extern template class Mlp<float>;

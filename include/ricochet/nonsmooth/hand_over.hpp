@@ -150,6 +150,7 @@ struct MixedRun {
     double t = 0;
     X x{};
     Mode mode = 0;
+    std::string reason;  ///< text of the `Stop` that ended the run
     std::vector<Event<X>> events;
     std::vector<Phase> phases;
     Trajectory<X> trajectory;  ///< at the sample times
@@ -226,6 +227,9 @@ public:
             !Moded<System, X> || requires(Mode & mode) { mode = system.start_mode(0.0, x0); },
             "ricochet: found a system with modes and set_valued(); expected Mode "
             "start_mode(double t, const State& x) const as well, the mode after it");
+        static_assert(!TimedByState<System, X>,
+                      "ricochet: found next_time_event([mode,] t, x) and set_valued(); expected "
+                      "next_time_event(t), Times time_events, or a guard");
         for (std::size_t i = 0; i < guard_count_of<X>(system); ++i) {
             if (guard_info_of<X>(system, i).stop_after > 1) {
                 throw std::invalid_argument(
@@ -268,6 +272,7 @@ private:
         Options options = options_;
         options.t_start = run_.t;
         options.mode = run_.mode;
+        options.continues = options_.continues || run_.phases.size() > 1;
         options.sample_times = remaining_samples();
         options.max_steps = options_.max_steps - steps_taken();
         options.record_events = true;  // the watches below review them
@@ -291,6 +296,7 @@ private:
         run_.t = done.t;
         run_.x = done.x;
         run_.mode = done.mode;
+        run_.reason = done.reason;
         if (options_.record_events) {
             std::move(done.events.begin(), done.events.end(), std::back_inserter(run_.events));
         }
@@ -311,7 +317,9 @@ private:
         double due = next_time_event();
         while (follow_inclusion_until(due)) {
             bool changes = false;
-            if (!apply_time_event(due, changes)) return true;
+            for (std::size_t entries = time_events_at(due); entries > 0; --entries) {
+                if (!apply_time_event(due, changes)) return true;
+            }
             if (changes) return false;
             due = next_time_event();
         }
@@ -374,10 +382,17 @@ private:
     [[nodiscard]] double next_time_event() const
     {
         if constexpr (Timed<System>) {
-            return system_.next_time_event(run_.t);
+            return detail::call_next_time_event(system_, run_.t);
         } else {
             return std::numeric_limits<double>::infinity();
         }
+    }
+
+    /// How many time events follow each other at a time that is one.
+    [[nodiscard]] std::size_t time_events_at([[maybe_unused]] double t) const
+    {
+        if constexpr (detail::ListsTimes<System>) return detail::times_of(system_).count(t);
+        return 1;
     }
 
     /// Records a time event and applies its reset. Events resume where that changes the state or
@@ -393,8 +408,16 @@ private:
         Mode mode = run_.mode;
         if constexpr (Moded<System, X>) mode = system_.start_mode(t, run_.x);
         event.mode_before = mode;
-        event.mode_after = detail::call_time_reset(system_, mode, t, event.after);
-        changes = event.mode_after != mode || event.after.size() != event.before.size() ||
+        bool stops = false;
+        try {
+            event.mode_after = detail::call_time_reset(system_, mode, t, event.after);
+        } catch (const Stop& stop) {
+            stops = true;
+            event.mode_after = stop.mode().value_or(mode);
+            run_.reason = stop.why();
+        }
+        changes = changes || event.mode_after != mode ||
+                  event.after.size() != event.before.size() ||
                   !detail::same_state(event.after, event.before);
         if (changes) {
             run_.x = event.after;
@@ -410,7 +433,8 @@ private:
             run_.outcome = Outcome::non_finite;
             return false;
         }
-        return true;
+        if (stops) run_.outcome = Outcome::stopped_by_event;
+        return !stops;
     }
 
     /// Error of a step that ends at state x.

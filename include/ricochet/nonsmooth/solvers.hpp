@@ -5,6 +5,8 @@
 // RICOCHET_INCLUSIONS_OF(N, M, extern) before its first use (detail/inclusion_sizes.hpp).
 #pragma once
 
+#include <memory>
+
 #include "ricochet/detail/any_hand_over.hpp"
 #include "ricochet/detail/debug_checks.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"

@@ -255,6 +255,10 @@ requires Flowing<System, X> && StateVector<X>
                                              const Locator& locator = {})
 {
     detail::check_declarations<System, X>();
+    static_assert(
+        detail::derivatives_in_order<System, X>(),
+        "ricochet: found a guard_derivative or reset_derivative that takes the Mode before "
+        "the number of the guard; expected ([std::size_t which,] [Mode,] double t, ...)");
     const Variational<System, X> variational(system, x0, directions, options);
     Options all = options;
     all.component_atol = variational.tolerances(options);
@@ -269,7 +273,8 @@ requires Flowing<System, X> && StateVector<X>
 
 /// The derivative of the state after one `period` [s] with respect to the state at its start: the
 /// product of the fundamental matrices of the flights and the saltation matrices of the
-/// events. NaN if it does not exist, or if the run does not reach its end.
+/// events. NaN if it does not exist, or if the run does not reach its end. `floquet_multipliers`
+/// has its eigenvalues (`eigenvalues()` of Eigen needs the header <Eigen/Eigenvalues>).
 ///
 /// @param options  `t_end` is not used
 /// @throws std::invalid_argument as `sensitivities`.
@@ -288,6 +293,9 @@ requires Flowing<System, X> && StateVector<X>
     }
     return result.state;
 }
+
+/// Eigenvalues of a monodromy matrix, the largest first; NaN where a number of it is not finite.
+[[nodiscard]] Eigen::VectorXcd floquet_multipliers(const Eigen::MatrixXd& monodromy);
 
 // Periodic orbits by shooting.
 //

@@ -314,6 +314,8 @@ std::string fault_map(const StrikeSlipFault& fault, const Eigen::VectorXd& value
 
 int simulate_fault(const SystemEntry& system, const SimulateRequest& request)
 {
+    if (request.phase)
+        throw BadInput("--phase is not for the system fault, whose picture is a map");
     refuse_what_is_not_for_faults(request.run);
     const std::vector<double> values = parameter_values(system, request.run.set);
     if (has_rate_and_state(values)) return simulate_rate_state_fault(system, request, values);

@@ -205,6 +205,7 @@ int simulate_spring_slider(const SystemEntry& entry, const SimulateRequest& requ
     if (request.kernel) throw BadInput("--kernel is for the system fault");
     Claims claims;
     claim_results(claims, request);
+    const std::optional<PhasePlane> plane = phase_plane(entry, request);
     settings.options.t_end = options.t_end;
 
     const Interrupts interrupts;
@@ -222,7 +223,7 @@ int simulate_spring_slider(const SystemEntry& entry, const SimulateRequest& requ
                  if (request.csv) write_file(*request.csv, to_csv(entry, plain(slider, run)));
              },
              [&] {
-                 if (request.plot) plot(entry, settings, plain(slider, run), *request.plot);
+                 if (request.plot) plot(entry, settings, plain(slider, run), *request.plot, plane);
              }});
     if (run.outcome == Outcome::cancelled) {
         return ended_early(fmt::format("at t = {} s", run.state.t));

@@ -111,15 +111,18 @@ learn::GuardProblem problem_of(const Model& model, const fs::path& file)
 std::string to_text(const learn::CertifyReport& report)
 {
     std::string out;
-    for (const CertificateLevel& level : report.levels) {
-        out += fmt::format("guard > {} where the logit is below {}: {} boxes in {}, {} unproved\n",
-                           level.margin, level.threshold, level.boxes, duration(level.seconds),
-                           level.unproved.size());
+    for (std::size_t i = 0; i < report.levels.size(); ++i) {
+        const CertificateLevel& level = report.levels[i];
+        out += fmt::format(
+            "guard > {} where the logit is below {}, in {:.2g} % of the domain: {} boxes in {}, {} "
+            "unproved\n",
+            level.margin, level.threshold, 100 * report.clears[i], level.boxes,
+            duration(level.seconds), level.unproved.size());
     }
     if (!report.counterexample.empty()) {
         out += fmt::format("counterexample: ({})\n", joined(report.counterexample, ", "));
     }
-    return out + fmt::format("{}\n", learn::describe(report.outcome));
+    return out + fmt::format("{}\n", learn::describe(report));
 }
 
 std::string_view name(learn::CertifyOutcome outcome)
@@ -140,9 +143,11 @@ std::string_view name(learn::CertifyOutcome outcome)
 std::string to_json(const learn::CertifyReport& report, const fs::path& out, bool written)
 {
     Json levels = Json::array();
-    for (const CertificateLevel& level : report.levels) {
+    for (std::size_t i = 0; i < report.levels.size(); ++i) {
+        const CertificateLevel& level = report.levels[i];
         levels.push_back({{"margin", level.margin},
                           {"threshold", level.threshold},
+                          {"clears", report.clears[i]},
                           {"boxes", level.boxes},
                           {"seconds", level.seconds},
                           {"unproved", level.unproved.size()}});

@@ -7,6 +7,16 @@
 
 namespace ricochet::app {
 
+namespace {
+
+std::vector<std::string_view> coulomb()
+{
+    return {"at each contact, with the normal force N >= 0:",
+            "|F| <= friction N, and equal to it against the sliding velocity where that is not 0"};
+}
+
+}  // namespace
+
 // --- incline block ---
 
 SystemEntry incline_block_entry()
@@ -15,6 +25,9 @@ SystemEntry incline_block_entry()
         .name = InclineBlock::name,
         .description =
             "A block on an inclined plane slides in two directions under a cone of friction.",
+        .equations =
+            {"vx' = gravity sin(slope) + rx,  vy' = ry",
+             "|r| <= friction gravity cos(slope), and equal to it against v where v is not 0"},
         .parameters = {{.name = "slope",
                         .initial = 0.3,
                         .unit = "rad",
@@ -61,6 +74,10 @@ SystemEntry rolling_ball_entry()
     return {
         .name = RollingBall::name,
         .description = "A ball slides, rolls and comes to rest on a moving plate.",
+        .equations = {"mass v' = F,  |F| <= friction mass gravity, against v - radius spin - s",
+                      "2/5 mass radius^2 spin' = -radius F + M,  |M| <= resistance mass gravity, "
+                      "against spin",
+                      "s = plate-speed cos(plate-frequency t), the velocity of the plate"},
         .parameters = {{.name = "mass",
                         .initial = 0.2,
                         .unit = "kg",
@@ -129,6 +146,7 @@ SystemEntry two_contact_block_entry()
     return {
         .name = TwoContactBlock::name,
         .description = "A block falls on its two corners, bounces, slides and comes to rest.",
+        .equations = coulomb(),
         .parameters =
             {{.name = "mass",
               .initial = 2,
@@ -202,6 +220,7 @@ SystemEntry woodpecker_entry()
         .source =
             "F. Pfeiffer, Mechanische Systeme mit unstetigen Übergängen, Ingenieur-Archiv "
             "54, 1984; C. Glocker and C. Studer, Multibody System Dynamics 13, 2005",
+        .equations = coulomb(),
         .parameters =
             {{.name = "friction",
               .initial = 0.3,

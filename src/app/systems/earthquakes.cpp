@@ -11,6 +11,19 @@ namespace ricochet::app {
 
 namespace {
 
+/// Adds the laws of rate-and-state friction.
+void add_rate_state_laws(std::vector<std::string_view>& equations)
+{
+    for (const std::string_view line :
+         {"f = a asinh(V / w),  w = 2 v_star exp(-(f_star + b log(v_star theta / d_rs)) / a);",
+          "    where V >> w: f = f_star + a log(V / v_star) + b log(v_star theta / d_rs)",
+          "law 0, ageing:            theta' = 1 - s theta / d_rs,  s = sqrt(V^2 + w^2) - w",
+          "law 1, slip:              theta' = -(s theta / d_rs) log(s theta / d_rs)",
+          "law 2, Perrin-Rice-Zheng: theta' = 1 - (s theta / (2 d_rs))^2"}) {
+        equations.push_back(line);
+    }
+}
+
 /// Parameters of rate-and-state friction, which follow the others.
 std::vector<Parameter> rate_state_parameters()
 {
@@ -59,6 +72,9 @@ SystemEntry fault_entry()
     SystemEntry entry{
         .name = "fault",
         .description = "A strike-slip fault of n x n elements slips in an earthquake.",
+        .equations = {"of each element, with the accumulated slip s and the normal stress sigma:",
+                      "|tau| <= sigma (residual_friction + friction_drop exp(-s / slip_distance))",
+                      "with rate_and_state = 1, at the slip rate V: tau = sigma f,"},
         .parameters = {{.name = "elements",
                         .initial = 1,
                         .unit = "1",
@@ -137,6 +153,7 @@ SystemEntry fault_entry()
         .program = "fault",
     };
     for (const Parameter& p : rate_state_parameters()) entry.parameters.push_back(p);
+    add_rate_state_laws(entry.equations);
     return entry;
 }
 
@@ -144,10 +161,18 @@ SystemEntry spring_slider_entry()
 {
     constexpr Range positive_range{.lower = 0};
     const RateStateParameters law;
-    return {
+    SystemEntry entry{
         .name = "spring-slider",
         .description = "A block with rate-and-state friction, pulled by a spring: stick-slip.",
-        .parameters = {{"ratio", 0.5, "1", positive_range, "stiffness, in critical stiffnesses"},
+        .source =
+            "critical stiffness: J. R. Rice and A. L. Ruina, Stability of steady frictional "
+            "slipping, Journal of Applied Mechanics 50, 1983",
+        .equations = {"mass x'' = k (f_star force / k + velocity t - x) - force f,  V = x'",
+                      "k = ratio k_critical,",
+                      "k_critical = force (b - a) / d_rs (1 + mass velocity^2 / (force a d_rs)):",
+                      "    below it steady sliding at the load's velocity, with the inertia of the",
+                      "    block, is unstable"},
+        .parameters = {{"ratio", 0.5, "1", positive_range, "stiffness over k_critical"},
                        {"velocity", 1.5e-4, "m/s", positive_range, "of the load"},
                        {"a", law.a, "1", positive_range, "direct effect"},
                        {"b", law.b, "1", positive_range, "effect of the state, above a"},
@@ -182,6 +207,8 @@ SystemEntry spring_slider_entry()
         .start = nullptr,
         .run = nullptr,
         .program = "fault"};
+    add_rate_state_laws(entry.equations);
+    return entry;
 }
 
 }  // namespace ricochet::app

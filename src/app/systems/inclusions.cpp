@@ -18,6 +18,8 @@ SystemEntry coulomb_oscillator_entry()
     return {
         .name = CoulombOscillator::name,
         .description = "A mass on a spring comes to rest under dry friction after a few turns.",
+        .equations = {"slipping: mass u'' = -stiffness u - friction sign(v)",
+                      "sticking: u'' = 0 while stiffness |u| <= static-friction"},
         .parameters = {{.name = "mass",
                         .initial = 1,
                         .unit = "kg",
@@ -71,6 +73,14 @@ SystemEntry friction_inclusion_entry()
     return {
         .name = FrictionInclusion::name,
         .description = "A mass on a spring rubs on a belt, under one of several laws of friction.",
+        .equations =
+            {"mass u'' = -stiffness u + r,  s = |v - belt-speed|",
+             "slipping: |r| = F(s), against v - belt-speed", "sticking: |r| <= F(0)",
+             "law 0, constant:    F(s) = friction",
+             "law 1, hyperbolic:  F(s) = friction / (1 + weakening s)",
+             "law 2, exponential: F(s) = residual + (friction - residual) exp(-weakening s)",
+             "law 3, humped:      F(s) = friction (1 - weakening s + weakening^2 s^2 / 3),",
+             "                           at least residual"},
         .parameters = {{.name = "law",
                         .initial = 2,
                         .unit = "1",
@@ -140,6 +150,9 @@ SystemEntry stick_slip_entry()
             "R. I. Leine, D. H. van Campen, A. de Kraker and L. van den Steen, Stick-slip "
             "vibrations induced by alternate friction models, Nonlinear Dynamics 16, 1998, "
             "pages 41 to 54",
+        .equations = {"slipping: mass u'' = -stiffness u - F(s) sign(v - belt-speed),",
+                      "    F(s) = friction / (1 + weakening s),  s = |v - belt-speed|",
+                      "sticking: u' = belt-speed while stiffness |u| <= friction"},
         .parameters = {{.name = "mass",
                         .initial = 1,
                         .unit = "kg",

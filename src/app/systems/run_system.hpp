@@ -60,7 +60,7 @@ TimedRun with_gate(const RunSettings& settings, Use&& use)
     const Model& model = settings.gate.value();
     const bool horizon = model.kind == "gate-horizon";
     const bool blind = settings.detector == DetectorKind::calibrated && horizon;
-    if (!blind && !Bounded<System, X>) {
+    if (!blind && !BoundedGuards<System, X>) {
         throw BadInput("the " + std::string(name(settings.detector)) +
                        " gate closes intervals by bounds, which this system does not declare; "
                        "expected --gate calibrated with a horizon gate");

@@ -20,6 +20,13 @@ namespace ricochet::c {
 [[noreturn]] void throw_callback_failed(const char* callback, int code, std::size_t guard,
                                         double t);
 
+/// What rc_stop returns.
+inline constexpr int stop_code = -0x53544f50;
+
+/// The text of the call of rc_stop whose result a callback of this thread has returned.
+/// @throws Stop if there was one, with the mode after the event
+void end_run_if_asked(int code, Mode mode);
+
 /// Checks the return value of a callback, and throws CallbackFailed unless it is 0.
 [[gnu::always_inline]] inline void heed(int code, const char* callback, double t,
                                         std::size_t guard = RC_NO_GUARD)
@@ -95,15 +102,20 @@ public:
     template <class X>
     [[nodiscard]] Mode reset(std::size_t which, Mode mode, double t, X& x) const
     {
-        heed(at_.reset(at_.user, which, &mode, t, x.data(), x.size()), "reset", t, which);
+        const int code = at_.reset(at_.user, which, &mode, t, x.data(), x.size());
+        if (code == stop_code) [[unlikely]]
+            end_run_if_asked(code, mode);
+        heed(code, "reset", t, which);
         return mode;
     }
     template <class X>
     [[nodiscard]] Mode reset_set(const FiredGuards& fired, Mode mode, double t, X& x) const
     {
-        heed(at_.reset_set(at_.user, fired.guards().data(), fired.size(), fired.time_event(), &mode,
-                           t, x.data(), x.size()),
-             "reset_set", t);
+        const int code = at_.reset_set(at_.user, fired.guards().data(), fired.size(),
+                                       fired.time_event(), &mode, t, x.data(), x.size());
+        if (code == stop_code) [[unlikely]]
+            end_run_if_asked(code, mode);
+        heed(code, "reset_set", t);
         return mode;
     }
     template <class X>
@@ -134,6 +146,19 @@ public:
         heed(at_.next_time_event(at_.user, t, &next), "next_time_event", t);
         return next;
     }
+    template <class X>
+    [[nodiscard]] double next_time_event_at(Mode mode, double t, const X& x) const
+    {
+        double next = nan;
+        heed(at_.next_time_event_at(at_.user, mode, t, x.data(), x.size(), &next),
+             "next_time_event_at", t);
+        return next;
+    }
+    [[nodiscard]] bool has_time_events() const noexcept
+    {
+        return at_.next_time_event || at_.next_time_event_at || at_.time_event_count > 0 ||
+               at_.time_event_period > 0;
+    }
     [[nodiscard]] double previous_time_event(double t) const
     {
         double previous = nan;
@@ -143,8 +168,10 @@ public:
     template <class X>
     [[nodiscard]] Mode time_reset(Mode mode, double t, X& x) const
     {
-        if (!at_.time_reset) return mode;
-        heed(at_.time_reset(at_.user, &mode, t, x.data(), x.size()), "time_reset", t);
+        const int code = at_.time_reset(at_.user, &mode, t, x.data(), x.size());
+        if (code == stop_code) [[unlikely]]
+            end_run_if_asked(code, mode);
+        heed(code, "time_reset", t);
         return mode;
     }
 
@@ -176,6 +203,7 @@ public:
     [[nodiscard]] std::optional<double> parameter(std::string_view name) const;
 
     std::string name;
+    Times times;  ///< a list or a clock
 
 private:
     static constexpr double nan = std::numeric_limits<double>::quiet_NaN();

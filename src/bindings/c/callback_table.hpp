@@ -159,15 +159,31 @@ class CallbackTable {
 
     static void add_times(Table& table, const rc_callbacks& has)
     {
-        table.next_time_event = [](void* door, double t) { return of(door).next_time_event(t); };
+        if (has.next_time_event_at) {
+            table.next_time_event_at = [](void* door, Mode mode, double t, const X& x) {
+                return of(door).next_time_event_at(mode, t, x);
+            };
+        } else if (has.next_time_event) {
+            table.next_time_event = [](void* door, double t) {
+                return of(door).next_time_event(t);
+            };
+        } else {
+            table.next_time_event = [](void* door, double t) { return of(door).times.next(t); };
+            table.previous_time_event = [](void* door, double t) {
+                return of(door).times.previous(t);
+            };
+            table.time_event_count = [](void* door, double t) { return of(door).times.count(t); };
+        }
         if (has.previous_time_event) {
             table.previous_time_event = [](void* door, double t) {
                 return of(door).previous_time_event(t);
             };
         }
-        table.time_reset = [](void* door, Mode mode, double t, X& x) {
-            return of(door).time_reset(mode, t, x);
-        };
+        if (has.time_reset) {
+            table.time_reset = [](void* door, Mode mode, double t, X& x) {
+                return of(door).time_reset(mode, t, x);
+            };
+        }
     }
 
     static void add_bounds(Table& table, const rc_callbacks& has)
@@ -208,7 +224,7 @@ public:
         table.guard_count = [](void* door) { return of(door).guard_count(); };
         table.name = [](void* door) { return of(door).name; };
         if (has.guard_count > 0) add_guards(table, has);
-        if (has.next_time_event) add_times(table, has);
+        if (system.has_time_events()) add_times(table, has);
         if (has.speed_bound) add_bounds(table, has);
         return table;
     }

@@ -59,7 +59,7 @@ struct rc_monitor : Handle {
     rc_outcome_code outcome = RC_RUNNING;
     State room;
     std::unique_ptr<CallbackSetup<State>> callbacks;
-    std::unique_ptr<ricochet::detail::AnyMonitor<State>> engine;
+    ricochet::detail::Owner<ricochet::detail::AnyMonitor<State>> engine;
     CallbackFailed failed;
 };
 
@@ -131,7 +131,7 @@ rc_status rc_monitor_free(rc_monitor* monitor)
 {
     if (!monitor) return RC_OK;
     const rc_status status = with(monitor, [](rc_monitor& at) {
-        at.engine.reset();
+        at.engine = {};
         at.callbacks.reset();
     });
     if (status == RC_OK) {
@@ -272,6 +272,12 @@ size_t rc_monitor_guard(rc_monitor* monitor)
 {
     return value_of(monitor, RC_NO_GUARD,
                     [](const rc_monitor& at) { return at.engine->run().guard; });
+}
+
+const char* rc_monitor_reason(rc_monitor* monitor)
+{
+    return value_of<const char*>(
+        monitor, "", [](const rc_monitor& at) { return at.engine->run().reason.c_str(); });
 }
 
 rc_status rc_monitor_callback_failure(rc_monitor* monitor, rc_callback_error* error)

@@ -157,9 +157,7 @@ RunOptions read_options(const rc_options* given)
     }
     Options& options = run.options;
     options.t_start = from.t_start;
-    if (!std::isfinite(from.t_end)) {
-        reader.refuse("t_end: found " + std::to_string(from.t_end) + ", expected a finite time");
-    }
+    if (std::isnan(from.t_end)) reader.refuse("t_end: found nan, expected a finite time");
     options.t_end = from.t_end;
     options.mode = from.mode;
     options.step = from.step;
@@ -167,6 +165,7 @@ RunOptions read_options(const rc_options* given)
     options.atol = from.atol;
     options.h_min = from.h_min;
     options.h_max = from.h_max;
+    options.continues = reader.flag("continues", from.continues);
     options.stop_at_event = reader.flag("stop_at_event", from.stop_at_event);
     options.record_steps = reader.flag("record_steps", from.record_steps);
     reader.read_events(from, options);

@@ -65,7 +65,11 @@ void write_statistics(rc_statistics* statistics, const Counts& counts)
                   .guard = counts.guard,
                   .other_guard = counts.other_guard,
                   .unmet_conditions = from.unmet_conditions,
-                  .ineffective_resets = from.ineffective_resets},
+                  .ineffective_resets = from.ineffective_resets,
+                  .declined_guard = from.declined_guard,
+                  .either_relays = from.either_relays,
+                  .relay_guard = from.relay_guard,
+                  .armed_beyond = from.armed_beyond},
                  "rc_statistics");
 }
 

@@ -36,6 +36,8 @@ public:
     [[nodiscard]] virtual bool ended() const noexcept = 0;
     [[nodiscard]] virtual Outcome outcome() const noexcept = 0;
 
+    [[nodiscard]] virtual const std::string& reason() const noexcept = 0;
+    [[nodiscard]] virtual std::string description() = 0;
     [[nodiscard]] virtual Counts counts() = 0;
     [[nodiscard]] virtual std::size_t events() const noexcept = 0;
     [[nodiscard]] virtual ShownEvent event(std::size_t i) const noexcept = 0;

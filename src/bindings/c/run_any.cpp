@@ -1,5 +1,7 @@
 #include "bindings/c/run_of.hpp"
 
+#include <memory>
+
 template class ricochet::c::CallbackSetup<std::vector<double>>;
 
 std::unique_ptr<ricochet::c::AnyRun> ricochet::c::make_run_of_any(

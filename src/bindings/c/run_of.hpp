@@ -49,6 +49,11 @@ public:
     [[nodiscard]] bool ended() const noexcept override { return loop_->ended(); }
     [[nodiscard]] Outcome outcome() const noexcept override { return loop_->run().outcome; }
 
+    [[nodiscard]] const std::string& reason() const noexcept override
+    {
+        return loop_->run().reason;
+    }
+    [[nodiscard]] std::string description() override { return describe(loop_->bring_up_to_date()); }
     [[nodiscard]] Counts counts() override
     {
         const Run<X>& run = loop_->bring_up_to_date();
@@ -117,6 +122,7 @@ private:
     [[nodiscard]] detail::RunSetup<X> setup_of(std::size_t size, const RunOptions& options) const
     {
         detail::RunSetup<X> setup = callbacks_.setup();
+        setup.cancels_by_itself = true;
         switch (options.method) {
             case RC_DOPRI5: set_method<Dopri5>(setup, size, options.fixed_step); break;
             case RC_FEHLBERG78: set_method<Fehlberg78>(setup, size, options.fixed_step); break;
@@ -129,7 +135,7 @@ private:
     }
 
     CallbackSetup<X> callbacks_;
-    std::unique_ptr<detail::AnyLoop<X>> loop_;
+    detail::Owner<detail::AnyLoop<X>> loop_;
     X like_;
 };
 

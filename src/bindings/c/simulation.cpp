@@ -25,6 +25,7 @@ struct rc_simulation : Handle {
     /// Why the last call that advanced the run did not finish: RC_RUNNING if it did.
     rc_outcome_code interrupted = RC_RUNNING;
     CallbackFailed failed;
+    std::string description;  ///< what rc_describe has returned
 };
 
 namespace ricochet::c {
@@ -210,6 +211,24 @@ const char* rc_outcome_text(rc_outcome_code outcome)
     if (outcome == RC_RUNNING) return "the run has not ended";
     if (!is_outcome(outcome)) return "there is no such outcome";
     return as_c(ricochet::describe(static_cast<ricochet::Outcome>(outcome)));
+}
+
+const char* rc_reason(rc_simulation* simulation)
+{
+    return value_of<const char*>(simulation, "",
+                                 [](const rc_simulation& at) { return at.run->reason().c_str(); });
+}
+
+const char* rc_describe(rc_simulation* simulation)
+{
+    return value_of<const char*>(simulation, "", [](rc_simulation& at) {
+        at.description = at.run->description();
+        if (!at.run->ended()) {
+            const std::string unset(ricochet::describe(ricochet::Outcome::reached_end));
+            at.description.replace(0, unset.size(), "the run has not ended");
+        }
+        return at.description.c_str();
+    });
 }
 
 rc_status rc_get_statistics(rc_simulation* simulation, rc_statistics* statistics)

@@ -1,7 +1,13 @@
 #include "bindings/c/system.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <new>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "bindings/c/structs.hpp"
 
@@ -39,8 +45,19 @@ void check(const rc_callbacks& has)
     require(!(has.reset && has.reset_set),
             "found both `reset` and `reset_set`; expected one of them");
     require(!has.rest || has.reset || has.reset_set, "found a rest without a reset");
-    require(!has.time_reset || has.next_time_event, "found a time_reset without a next_time_event");
-    require(!has.previous_time_event || has.next_time_event,
+    const bool listed = has.time_event_count > 0;
+    const bool ticks = has.time_event_period != 0;
+    const bool asked = has.next_time_event || has.next_time_event_at;
+    require(!listed || has.time_events, "found a time_event_count above 0 without time_events");
+    require(
+        (has.next_time_event != nullptr) + (has.next_time_event_at != nullptr) + listed + ticks <=
+            1,
+        "found several of next_time_event, next_time_event_at, time_events and "
+        "time_event_period; expected one of them");
+    require(!has.time_reset || asked || listed || ticks || has.time_events,
+            "found a time_reset without a next_time_event, next_time_event_at, time_events or "
+            "time_event_period");
+    require(!has.previous_time_event || asked,
             "found a previous_time_event without a next_time_event");
     require(has.speed_bound || !(has.acceleration_bound || has.lower_bound || has.upper_bound),
             "found a bound without a speed_bound");
@@ -88,16 +105,38 @@ void check(const rc_callbacks& has)
             .unilateral = flag(which, "unilateral", given.unilateral),
             .boolean = flag(which, "boolean", given.boolean),
             .degree = given.degree,
-            .touch = given.touch};
+            .touch = given.touch,
+            .at_start = flag(which, "at_start", given.at_start),
+            .at_entry = flag(which, "at_entry", given.at_entry)};
 }
 
+/// The reason of the last call of rc_stop in this thread.
+thread_local std::optional<std::string> reason_here;
+
 }  // namespace
+
+void end_run_if_asked(int code, Mode mode)
+{
+    if (code != stop_code || !reason_here) return;
+    std::string reason = std::move(*reason_here);
+    reason_here.reset();
+    throw Stop(std::move(reason), mode);
+}
 
 CallbackSystem::CallbackSystem(const rc_callbacks& given)
     : name(given.name ? given.name : "callbacks"), at_(given)
 {
     check(given);
     at_.name = nullptr;
+    at_.time_events = nullptr;
+    if (given.time_event_count > 0) {
+        const double* first = given.time_events;
+        times = Times(std::vector<double>(first, first + given.time_event_count),
+                      "rc_callbacks.time_events");
+    } else if (given.time_event_period != 0) {
+        times = every(given.time_event_period, given.time_event_phase,
+                      "rc_callbacks.time_event_period");
+    }
     const std::size_t count = given.guard_count;
     infos_.resize(count);
     guard_names_.resize(count);
@@ -140,6 +179,31 @@ rc_status rc_system_new(const rc_callbacks* callbacks, rc_system** system)
         *system = nullptr;
         *system = new rc_system(read_struct<rc_callbacks>(callbacks, "rc_callbacks"));
     });
+}
+
+int rc_stop(const char* reason)
+{
+    // Without memory for the text the run is ended without it.
+    try {
+        reason_here = reason ? reason : "";
+    } catch (const std::bad_alloc&) {
+        reason_here = "";
+    }
+    return stop_code;
+}
+
+double rc_next_tick(double period, double phase, double t)
+{
+    if (!(period > 0)) return std::numeric_limits<double>::quiet_NaN();
+    return guarded_value(std::numeric_limits<double>::quiet_NaN(),
+                         [&] { return ricochet::every(period, phase).next(t); });
+}
+
+double rc_next_listed(const double* times, size_t count, double t)
+{
+    const double* last = times + count;
+    const double* next = std::upper_bound(times, last, t);
+    return next == last ? std::numeric_limits<double>::infinity() : *next;
 }
 
 void rc_system_free(rc_system* system)

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 #include <utility>
 
@@ -48,15 +49,33 @@ public:
         table.mode_count = [](void* door) { return at(door).source_.mode_count_; };
         table.guard_count = [](void* door) { return at(door).source_.guards_.size(); };
         table.name = [](void* door) { return at(door).name(); };
-        if (source.next_time_event_) {
+        if (source.times_) {
             table.next_time_event = [](void* door, double t) {
-                return at(door).time_event(at(door).source_.next_time_event_, t, infinity);
+                return at(door).source_.times_->next(t);
             };
+            table.previous_time_event = [](void* door, double t) {
+                return at(door).source_.times_->previous(t);
+            };
+            table.time_event_count = [](void* door, double t) {
+                return at(door).source_.times_->count(t);
+            };
+        } else if (source.next_time_event_ || source.next_time_event_at_) {
+            if (source.next_time_event_at_) {
+                table.next_time_event_at = [](void* door, Mode mode, double t, const State& x) {
+                    return at(door).timer(mode, t, x);
+                };
+            } else {
+                table.next_time_event = [](void* door, double t) {
+                    return at(door).time_event(at(door).source_.next_time_event_, t, infinity);
+                };
+            }
             if (source.previous_time_event_) {
                 table.previous_time_event = [](void* door, double t) {
                     return at(door).time_event(at(door).source_.previous_time_event_, t, -infinity);
                 };
             }
+        }
+        if (source.time_reset_) {
             table.time_reset = [](void* door, Mode mode, double t, State& x) {
                 return at(door).time_reset(mode, t, x);
             };
@@ -110,7 +129,7 @@ public:
         if (any(&CallbackGuard::rest)) {
             table.rest = [](void* door, std::size_t which, Mode mode, double t, State& x) {
                 const CallbackGuard& guard = at(door).source_.guards_[which];
-                return at(door).edit(guard.rest, "rest of ", guard.owner, mode, t, x);
+                return at(door).edit(guard.rest, "rest of ", guard.owner, mode, t, x, false);
             };
         }
         if (every(&CallbackGuard::speed_bound)) fill_bounds(table, any);
@@ -317,8 +336,9 @@ private:
     // --- resets ---
 
     /// x⁻ becomes x⁺; returns the mode after it.
+    /// @param may_stop  whether the function may end the run
     [[nodiscard]] Mode edit(const Function& function, const char* what, const std::string& of,
-                            Mode mode, double t, State& x)
+                            Mode mode, double t, State& x, bool may_stop = true)
     {
         if (!function) return mode;
         if (function.address) {
@@ -326,8 +346,46 @@ private:
             const Mode next = reset(mode, t, x.data(), x.size(), function.user);
             return source_.moded_ ? next : mode;
         }
-        const Ref result = call(function, mode, t, x_.show(x));
-        return take_place(result.get(), what, of, mode, x);
+        if (!may_stop) {
+            const Ref result = call(function, mode, t, x_.show(x));
+            return take_place(result.get(), what, of, mode, x);
+        }
+        const Ref result = call_reset(function, mode, t, x_.show(x));
+        return take_result(result.get(), what, of, mode, x);
+    }
+
+    [[nodiscard]] static bool is_stop(PyObject* object)
+    {
+        const Ref& known = stop_class();
+        return known && PyObject_IsInstance(object, known.get()) == 1;
+    }
+
+    /// What a reset has returned; the `Stop`, if it has raised one.
+    template <class... Further>
+    [[nodiscard]] Ref call_reset(const Function& function, Mode mode, double t,
+                                 const Further&... further) const
+    {
+        try {
+            return call(function, mode, t, further...);
+        } catch (const PythonError& error) {
+            if (!is_stop(error.value())) throw;
+            return Ref::share(error.value());
+        }
+    }
+
+    /// The mode after a reset, whose state is taken into x.
+    /// @throws Stop if it has ended the run
+    [[nodiscard]] Mode take_result(PyObject* result, const char* what, const std::string& of,
+                                   Mode mode, State& x)
+    {
+        if (!is_stop(result)) return take_place(result, what, of, mode, x);
+        const Ref reason = checked(PyObject_GetAttrString(result, "reason"));
+        const Ref after = checked(PyObject_GetAttrString(result, "after"));
+        const char* text = PyUnicode_AsUTF8(reason.get());
+        if (!text) throw PythonError();
+        const Mode next =
+            after.get() == Py_None ? mode : take_place(after.get(), what, of, mode, x);
+        throw Stop(text, next);
     }
 
     [[nodiscard]] Mode reset_set(const FiredGuards& fired, Mode mode, double t, State& x)
@@ -341,8 +399,8 @@ private:
             PyList_SET_ITEM(list.get(), static_cast<Py_ssize_t>(fired.size()),
                             PyUnicode_FromString("time"));
         }
-        const Ref result = call(source_.reset_set_, mode, t, x_.show(x), list.get());
-        return take_place(result.get(), "reset_set", no_guard_, mode, x);
+        const Ref result = call_reset(source_.reset_set_, mode, t, x_.show(x), list.get());
+        return take_result(result.get(), "reset_set", no_guard_, mode, x);
     }
 
     [[nodiscard]] Mode time_reset(Mode mode, double t, State& x)
@@ -397,6 +455,12 @@ private:
         }
         x.resize(numbers.size());
         numbers.copy(x.data());
+    }
+
+    [[nodiscard]] double timer(Mode mode, double t, const State& x)
+    {
+        const Ref result = call(source_.next_time_event_at_, mode, t, x_.show(x));
+        return result.get() == Py_None ? infinity : as_guard(result.get(), "next_time_event");
     }
 
     [[nodiscard]] double time_event(const Function& function, double t, double never)

@@ -1,5 +1,7 @@
 #include "callbacks.hpp"
 
+#include <pybind11/pybind11.h>
+
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,6 +45,12 @@ namespace {
 
 }  // namespace
 
+Ref& stop_class() noexcept
+{
+    static Ref& known = *new Ref();  // outlives the interpreter
+    return known;
+}
+
 Function::Function(PyObject* given, const std::string& who)
 {
     if (given == Py_None) return;
@@ -78,8 +86,12 @@ CallbackSource::CallbackSource(PyObject* specification)
     guard_values_ = function("guard_values");
     reset_set_ = function("reset_set");
     next_time_event_ = function("next_time_event");
+    next_time_event_at_ = function("next_time_event_at");
     previous_time_event_ = function("previous_time_event");
     time_reset_ = function("time_reset");
+    if (const Ref times = item(specification, "time_events"); times.get() != Py_None) {
+        times_ = pybind11::handle(times.get()).cast<Times>();
+    }
 
     const Ref arguments = item(specification, "args");
     if (arguments.get() != Py_None) {
@@ -129,7 +141,7 @@ CallbackSource::CallbackSource(PyObject* specification)
 
     const auto is_free = [](const Function& f) { return !f || f.address; };
     free_ = is_free(flow_) && !guard_values_ && !reset_set_ && !next_time_event_ &&
-            !previous_time_event_ && is_free(time_reset_);
+            !next_time_event_at_ && !previous_time_event_ && is_free(time_reset_);
     for (const CallbackGuard& guard : guards_) {
         free_ = free_ && is_free(guard.value) && is_free(guard.rate) && is_free(guard.reset) &&
                 is_free(guard.rest) && !guard.enabled && is_free(guard.speed_bound) &&
@@ -181,7 +193,9 @@ void CallbackSource::read_guard(PyObject* specification)
         .unilateral = truth_in(specification, "unilateral"),
         .boolean = truth_in(specification, "boolean"),
         .degree = static_cast<int>(number_in(specification, "degree", 0)),
-        .touch = number_in(specification, "touch", 0)};
+        .touch = number_in(specification, "touch", 0),
+        .at_start = truth_in(specification, "at_start"),
+        .at_entry = truth_in(specification, "at_entry")};
     const Ref modes = item(specification, "in_modes");
     if (modes.get() == Py_None) return;
     if (!moded_) {

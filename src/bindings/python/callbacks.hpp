@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -39,6 +40,9 @@ using CompiledRate = double (*)(std::uint32_t mode, double t, const double* x, c
                                 std::size_t n, void* user);
 using CompiledReset = std::uint32_t (*)(std::uint32_t mode, double t, double* x, std::size_t n,
                                         void* user);
+
+/// The class `Stop` of Python, an instance of which ends a run; null before it is known.
+[[nodiscard]] Ref& stop_class() noexcept;
 
 /// Most arguments of a call, further ones included.
 constexpr std::size_t most_arguments = 32;
@@ -75,7 +79,8 @@ private:
     std::string name_;
     std::string flow_title_;  ///< in messages: "flow", "fun"
     Function flow_, guard_values_, reset_set_;
-    Function next_time_event_, previous_time_event_, time_reset_;
+    Function next_time_event_, next_time_event_at_, previous_time_event_, time_reset_;
+    std::optional<Times> times_;  ///< a list of time events, or a clock
     std::vector<CallbackGuard> guards_;
     std::vector<Ref> arguments_;    ///< the user's further arguments of every function
     Ref mode_list_, mode_numbers_;  ///< names of the modes and their numbers; null without modes

@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -46,6 +47,11 @@ public:
     DoorSystem(const Source& source, const State& like)
         : source_(&source), door_(source.open(like)), table_(&door_->table())
     {
+        if (table_->next_time_event_at) {
+            throw std::invalid_argument(
+                "next_time_event: found one that takes the state, expected next_time_event(t) or "
+                "time_events, whose runs a network can learn from");
+        }
         name = table_->name(door_->door());
     }
 

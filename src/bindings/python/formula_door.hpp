@@ -131,6 +131,8 @@ private:
         forward<&Table::rest>(table, from);
         forward<&Table::next_time_event>(table, from);
         forward<&Table::previous_time_event>(table, from);
+        forward<&Table::next_time_event_at>(table, from);
+        forward<&Table::time_event_count>(table, from);
         forward<&Table::time_reset>(table, from);
         forward<&Table::lipschitz>(table, from);
         forward<&Table::speed_bound>(table, from);

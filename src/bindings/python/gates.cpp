@@ -80,7 +80,7 @@ public:
                 return detail::GateAnswer{answer.cleared, answer.outside};
             };
         }
-        if constexpr (std::is_same_v<Detector, Network>) {
+        if constexpr (std::is_same_v<Detector, BareNetwork>) {
             table.clears = [](const void* at, void*, const detail::StepState<State>& step,
                               std::uint64_t& calls) {
                 detail::Door<AskedSystem, State> door(from(at).system_, step.x0);
@@ -132,7 +132,7 @@ bool detect_by_gate(OwnedSetup& out, const Request& request, const Source& sourc
     } else if (detector == "certified") {
         detect_by<Certified<>>(out, source, door, model());
     } else if (detector == "network") {
-        detect_by<Network>(out, source, door, model());
+        detect_by<BareNetwork>(out, source, door, model());
     } else {
         return false;
     }

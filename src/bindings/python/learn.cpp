@@ -481,25 +481,26 @@ py::object certify(const py::bytes& content, const std::shared_ptr<Source>& sour
     });
     using namespace py::literals;
     py::list levels;
-    for (const CertificateLevel& level : certified.report.levels) {
+    for (std::size_t i = 0; i < certified.report.levels.size(); ++i) {
+        const CertificateLevel& level = certified.report.levels[i];
         levels.append(py::dict("margin"_a = level.margin, "threshold"_a = level.threshold,
-                               "boxes"_a = level.boxes, "seconds"_a = level.seconds,
-                               "unproved"_a = level.unproved.size()));
+                               "clears"_a = certified.report.clears[i], "boxes"_a = level.boxes,
+                               "seconds"_a = level.seconds, "unproved"_a = level.unproved.size()));
     }
     py::list estimates;
     for (const learn::Estimate& e : certified.report.estimates) {
         estimates.append(py::dict("boxes"_a = e.boxes, "seconds"_a = e.seconds,
                                   "unproved"_a = e.unproved, "error"_a = e.error));
     }
-    return handed_back(background,
-                       py::dict("content"_a = bytes_of(std::move(certified.model), *source),
-                                "proved"_a = certified.proved(),
-                                "outcome"_a = static_cast<int>(certified.report.outcome),
-                                "outcome_text"_a = std::string(describe(certified.report.outcome)),
-                                "levels"_a = levels, "estimates"_a = estimates,
-                                "counterexample"_a = certified.report.counterexample,
-                                "seconds"_a = certified.report.seconds),
-                       wrap);
+    return handed_back(
+        background,
+        py::dict("content"_a = bytes_of(std::move(certified.model), *source),
+                 "proved"_a = certified.proved(),
+                 "outcome"_a = static_cast<int>(certified.report.outcome),
+                 "outcome_text"_a = describe(certified.report), "levels"_a = levels,
+                 "estimates"_a = estimates, "counterexample"_a = certified.report.counterexample,
+                 "seconds"_a = certified.report.seconds),
+        wrap);
 }
 
 }  // namespace

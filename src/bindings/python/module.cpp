@@ -55,6 +55,20 @@ PYBIND11_MODULE(_ricochet, module)
                                  const std::vector<double>& arguments) {
         return closed_form(system, what, arguments);
     });
+    using ricochet::Times;
+    py::class_<Times>(module, "Times",
+                      "Times of events: a list in any order, in which a time may be there twice. "
+                      "``every`` makes the ticks of a clock.")
+        .def(py::init([](const std::vector<double>& times) { return Times(times); }),
+             py::arg("times"))
+        .def("next", &Times::next, py::arg("t"), "The first time after t, or infinity.")
+        .def("previous", &Times::previous, py::arg("t"), "The last time before t, or -infinity.")
+        .def("count", &Times::count, py::arg("t"), "How often t is among the times.");
+    module.def("every", [](double period, double phase, const std::string& name) {
+        return ricochet::every(period, phase, name);
+    });
+    module.def("set_stop_class",
+               [](const py::object& known) { stop_class() = Ref::share(known.ptr()); });
     module.def("callback_system", [](const py::dict& specification) {
         return std::shared_ptr<Source>(std::make_shared<CallbackSource>(specification.ptr()));
     });

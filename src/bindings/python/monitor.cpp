@@ -356,7 +356,7 @@ private:
     std::unique_ptr<RunDoor> door_;
     detail::SystemTable<State> table_;
     OwnedSetup setup_;
-    std::unique_ptr<detail::AnyMonitor<State>> monitor_;
+    detail::Owner<detail::AnyMonitor<State>> monitor_;
     std::array<State, 2> rates_;
     bool ended_ = false;
     bool has_cut_ = false;  ///< since the start

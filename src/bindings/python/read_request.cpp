@@ -74,6 +74,7 @@ void set(Request& request, const py::handle& value)
         {"t_start", &set<&Options::t_start>},
         {"t_end", &set<&Options::t_end>},
         {"mode", &set<&Options::mode>},
+        {"continues", &set<&Options::continues>},
         {"step", &set<&Options::step>},
         {"rtol", &set<&Options::rtol>},
         {"atol", &set<&Options::atol>},

@@ -6,6 +6,7 @@
 #include <concepts>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
@@ -96,7 +97,9 @@ Record run_by(const Method& method, const Watched<System>& system, const State& 
     std::copy_n(x0.begin(), start.size(), start.begin());
     detail::PartsOfRun<Watched<System>, X, Stepping, Extremum, Newton> parts(
         system, start, Stepping{method}, Extremum{}, Newton{});
-    return record_of(detail::run_whole(parts.setup(), detail::core_state(start), request.options));
+    auto setup = parts.setup();
+    setup.cancels_by_itself = true;
+    return record_of(detail::run_whole(setup, detail::core_state(start), request.options));
 }
 
 template <class System>

@@ -46,6 +46,8 @@ struct Record {
     std::vector<double> states;                 ///< row after row of `width`
     std::shared_ptr<Solution<State>> solution;  ///< null if it was not kept
     std::string wrong_bound;                    ///< sentence about a violated bound
+    std::string reason;                         ///< text of the `Stop` that ended the run
+    std::vector<std::size_t> armed_beyond;      ///< guards that began beyond their surface
 
     [[nodiscard]] std::size_t event_stride() const noexcept
     {
@@ -82,6 +84,8 @@ template <class X>
     out.guard = signed_guard(run.guard);
     out.other_guard = signed_guard(run.other_guard);
     out.statistics = run.statistics;
+    out.reason = run.reason;
+    out.armed_beyond = run.armed_beyond;
     out.event_count = run.events.size();
     out.events.resize(out.event_count * out.event_stride());
     double* at = out.events.data();

@@ -9,6 +9,7 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -82,6 +83,13 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     add("disabled", s.disabled);
     add("unmet_conditions", s.unmet_conditions);
     add("ineffective_resets", s.ineffective_resets);
+    add("either_relays", s.either_relays);
+    const auto add_guard = [&](const char* name, std::size_t guard) {
+        counts[name] = guard == no_guard ? py::object(py::none()) : py::object(py::int_(guard));
+    };
+    add_guard("declined_guard", s.declined_guard);
+    add_guard("relay_guard", s.relay_guard);
+    add("armed_beyond", s.armed_beyond);
     counts["evidence"] = evidence;
     return space(**counts);
 }
@@ -129,7 +137,7 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         std::bit_cast<Counts>(r.statistics), r.width, r.event_count, bytes_of(r.events),
         bytes_of(r.times), bytes_of(r.states), r.wrong_bound,
         r.solution ? py::object(pickled(PySolution{r.solution})) : py::object(py::none()),
-        self.modes, self.guard_names);
+        self.modes, self.guard_names, r.reason, r.armed_beyond);
 }
 
 [[nodiscard]] PyRun run_from(const py::tuple& state)
@@ -156,6 +164,8 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     if (!state[13].is_none()) r.solution = solution_from(state[13]).solution;
     out.modes = state[14];
     out.guard_names = py::cast<std::vector<std::string>>(state[15]);
+    r.reason = py::cast<std::string>(state[16]);
+    r.armed_beyond = py::cast<std::vector<std::size_t>>(state[17]);
     return out;
 }
 
@@ -280,11 +290,19 @@ void bind_results(py::module_& module)
             "message",
             [](const PyRun& self) {
                 std::string out(describe(self.record.outcome));
-                if (self.record.outcome == Outcome::conflicting_resets) {
+                if (!self.record.reason.empty()) {
+                    out = "a reset ended the run: " + self.record.reason;
+                }
+                const bool conflicts = self.record.outcome == Outcome::conflicting_resets;
+                if (conflicts) {
                     constexpr std::string_view in_cpp = "reset(fired, t, x)";
                     if (const auto at = out.find(in_cpp); at != std::string::npos) {
                         out.replace(at, in_cpp.size(), "reset_set(t, x, fired)");
                     }
+                }
+                const bool in_turn =
+                    self.record.outcome == Outcome::zeno && self.record.other_guard >= 0;
+                if (conflicts || in_turn) {
                     const auto named = [&](std::int64_t guard) {
                         const auto which = static_cast<std::size_t>(guard);
                         return which < self.guard_names.size() ? self.guard_names[which]
@@ -293,9 +311,20 @@ void bind_results(py::module_& module)
                     out += ": " + named(self.record.guard) + ", " + named(self.record.other_guard);
                 }
                 if (!self.record.wrong_bound.empty()) out += ": " + self.record.wrong_bound;
-                return out;
+                std::string_view before =
+                    "; began beyond their surface, and waited until they had "
+                    "returned (at_start and at_entry let them fire there): ";
+                for (const std::size_t which : self.record.armed_beyond) {
+                    out += std::string(std::exchange(before, ", ")) + self.guard_names.at(which);
+                }
+                const std::string more = describe(self.record.statistics, self.guard_names);
+                return more.empty() ? out : out + "; " + more;
             },
-            "A sentence about the outcome.")
+            "A sentence about the outcome, about guards that began beyond their surface, and on "
+            "resets that declined.")
+        .def_property_readonly(
+            "reason", [](const PyRun& self) { return self.record.reason; },
+            "The text of the `Stop` that ended the run, or an empty one.")
         .def_property_readonly(
             "success",
             [](const PyRun& self) {
@@ -330,7 +359,9 @@ void bind_results(py::module_& module)
                 if (self.record.other_guard < 0) return py::none();
                 return py::int_(self.record.other_guard);
             },
-            "The guard of the second of two conflicting resets, -1 for a time event, or None.")
+            "The guard of the second of two conflicting resets, -1 for a time event; another guard "
+            "of "
+            "a cycle that accumulates; or None.")
         .def_readonly("modes", &PyRun::modes, "What the modes are called, or None.")
         .def_readonly("guard_names", &PyRun::guard_names, "What the guards are called.")
         .def_property_readonly(

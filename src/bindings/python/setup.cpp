@@ -1,5 +1,6 @@
 #include "setup.hpp"
 
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -80,6 +81,7 @@ OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door
     setup.system = &door.table();
     setup.door = door.door();
     setup.error_controlled = !request.fixed;
+    setup.cancels_by_itself = true;
     if (!detect_by_gate(out, request, source, door)) detect_without_gate(setup, request);
     if (request.by_series) {
         door.step_by_series(setup);

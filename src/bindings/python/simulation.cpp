@@ -102,7 +102,7 @@ PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& r
     const OwnedSetup owned = setup_for(request, *source, *door);
     Trajectory<State> steps;
     Trajectory<State>* const kept = request.record_steps ? &steps : nullptr;
-    std::unique_ptr<Loop> loop;
+    detail::Owner<Loop> loop;
     try {
         loop = detail::make_loop(owned.setup, x0, request.options);
         work_freely(door->is_free(), [&] { drive(*loop, kept); });
@@ -332,7 +332,7 @@ private:
     PyRun names_;
     std::unique_ptr<RunDoor> door_;
     OwnedSetup setup_;
-    std::unique_ptr<Loop> loop_;
+    detail::Owner<Loop> loop_;
     std::optional<PyRun> finished_;
     bool may_go_on_ = false;  ///< it has been run to its end, but its loop is still there
     std::atomic<bool> in_use_ = false;
