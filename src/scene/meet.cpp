@@ -185,19 +185,19 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
 
 /// [m] Distance beyond its ends up to which a segment is met: that of `World::leads_off` for discs,
 /// so that no disc leaves a segment before it is on the next one.
-static double slack_of(const Face& face, double radius, const Vector2& p)
+static double slack_of(const Face& face, double radius, const Vector2& p, double flown = 0)
 {
-    return radius == 0 ? World::end_slack(face, p) : 0.5 * World::rounding(p, 0);
+    return radius == 0 ? World::end_slack(face, p, flown) : 0.5 * World::rounding(p, 0);
 }
 
-FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above)
+FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above, double flown)
 {
     const double radius = body.radius;
     if (face.kind == Face::Kind::wall) {
         return {dot(p - face.at, face.normal) - radius, face.normal};
     }
     if (face.kind == Face::Kind::segment) {
-        if (!lies_on(face, p, slack_of(face, radius, p))) return {};
+        if (!lies_on(face, p, slack_of(face, radius, p, flown))) return {};
         const Vector2 normal = above ? face.normal : -1.0 * face.normal;
         return {dot(p - face.at, normal) - radius, normal};
     }
@@ -215,11 +215,11 @@ bool lies_on(const Face& face, const Vector2& p, double slack)
 
 /// Whether a body that reaches the line of a segment at p meets it between its ends.
 static bool lands_on(const World& world, const Body& body, std::uint32_t which, bool above,
-                     const Vector2& p, const Vector2& v)
+                     const Vector2& p, const Vector2& v, double flown)
 {
     const Face& face = world.faces[which];
     if (body.radius > 0) return lies_on(face, p, slack_of(face, body.radius, p));
-    return world.holds(face, p) && !world.passes_end(body, which, above, p, v);
+    return world.holds(face, p, flown) && !world.passes_end(body, which, above, p, v, flown);
 }
 
 /// First contact with a wall, or with the inside of a segment.
@@ -232,7 +232,7 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
     const bool above = !segment || world.begins_above(b, which);
     const Vector2 normal = above ? face.normal : -1.0 * face.normal;
     const double gap = dot(path.c[0] - face.at, normal) - b.radius;
-    const double rounding = World::rounding(path.c[0], b.radius) + World::rounding(face.at, 0);
+    const double rounding = World::rounding(path.c[0], b.radius) + World::blur(face, b.radius);
     // A body on the line beside a segment reaches its end a little later.
     const bool on = !segment || lies_on(face, path.c[0], slack_of(face, b.radius, path.c[0]));
     const double closed = on ? rounding : 0;
@@ -243,7 +243,8 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
     const auto lands = [&](double s, bool side) {
         if (!segment || !std::isfinite(s)) return true;
         const Instant t = b.t.after(s);
-        return lands_on(world, b, which, side, world.position(i, t), world.velocity(i, t));
+        return lands_on(world, b, which, side, world.position(i, t), world.velocity(i, t),
+                        rounding_of_flight(b, s));
     };
     Meeting meeting{.from = b.t};
     const Polynomial c{gap, rate, bend, dot(path.c[3], normal), dot(path.c[4], normal)};

@@ -96,16 +96,14 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
     if (body.radius > 0 || !celled_ || !grid_.any_faces()) return sides;
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = world_.velocity(i, now_);
-    // The rounding of a long, high flight exceeds that of its end point.
-    const double s = seconds(body.t, now_);
-    const double flown = 4 * epsilon * s * (norm(body.v) + s * norm(body.a));
+    const double flown = rounding_of_flight(body, seconds(body.t, now_));
     for (const std::uint32_t f : grid_.faces(body)) {
         const Face& face = world_.faces[f];
         if (face.kind != Face::Kind::segment) continue;
         const bool above = world_.arrives_above(body, f, p, v);
         if (f != sure) {
-            const double gap = face_gap(face, body, p, above).gap;
-            const double tolerance = World::rounding(p, 0) + World::rounding(face.at, 0) + flown +
+            const double gap = face_gap(face, body, p, above, flown).gap;
+            const double tolerance = World::rounding(p, 0) + World::blur(face, 0) + flown +
                                      2 * resolution(now_) * std::fabs(dot(v, face.normal));
             // Four times, since the point is moved onto the line of another segment before it goes
             // on.
@@ -142,7 +140,7 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         }
         const bool above = face.kind == Face::Kind::segment && world_.arrives_above(body, f, p, v);
         const FaceGap at = face_gap(face, body, p, above);
-        double tolerance = World::rounding(p, body.radius) + World::rounding(face.at, 0) +
+        double tolerance = World::rounding(p, body.radius) + World::blur(face, body.radius) +
                            2 * resolution(now_) * std::fabs(dot(v, at.normal));
         if (known_to_group(i, true, f)) tolerance += loose * (body.radius + norm(p));
         if (f != sure && !(at.gap <= tolerance && at.gap >= -1e3 * tolerance)) return;
@@ -152,9 +150,12 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
     }
     cluster_.sides.push_back(sides_of(i, sure));
+    const double flown = rounding_of_flight(body, seconds(body.t, now_));
     for (const Side& side : cluster_.sides.back()) {
         const Face& face = world_.faces[side.face];
-        if (side.face != sure && world_.passes_end(body, side.face, side.above, p, v)) continue;
+        if (side.face != sure && world_.passes_end(body, side.face, side.above, p, v, flown)) {
+            continue;
+        }
         touch(side.face, side.above ? face.normal : -1.0 * face.normal);
     }
     if (body.radius > 0 && celled_ && grid_.any_faces()) {
@@ -377,14 +378,16 @@ std::uint32_t Runner::begin_record(std::uint32_t i, const Vector2& velocity,
                                    const std::vector<Side>& sides)
 {
     Body& body = world_.bodies[i];
-    body.p = place(body, seconds(body.t, now_));
+    const double s = seconds(body.t, now_);
+    const double flown = rounding_of_flight(body, s);
+    body.p = place(body, s);
     // A velocity whose square underflows is set to 0: in a corner it would be halved forever.
     body.v = norm(velocity) < 1e-150 ? Vector2{} : velocity;
     body.a = world_.gravity;
     body.t = now_;
     ++body.version;
     body.asleep = false;
-    if (body.radius == 0) world_.remember(body, sides);
+    if (body.radius == 0) world_.remember(body, sides, flown);
     return std::exchange(body.held, none);
 }
 
@@ -404,7 +407,8 @@ void Runner::apply(bool struck)
         series_[i].last = now_;
         if (body.radius == 0 && body.island != none) {
             if (body.contact == none) body.p = world_.position(i, now_);
-            world_.remember(body, cluster_.sides[k]);
+            world_.remember(body, cluster_.sides[k],
+                            rounding_of_flight(body, seconds(body.t, now_)));
         }
         if (!is_finite(cluster_.after[k])) {
             return fail(Outcome::non_finite, {i},

@@ -15,7 +15,8 @@ std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
         if (face.kind == Face::Kind::vertex) return;
         const bool above = face.kind == Face::Kind::segment && world_.begins_above(body, f);
         const double gap = face_gap(face, body, body.p, above).gap;
-        const double rounding = World::rounding(body.p, body.radius) + World::rounding(face.at, 0);
+        const double rounding =
+            World::rounding(body.p, body.radius) + World::blur(face, body.radius);
         const bool known =
             std::ranges::any_of(body.sides, [&](std::uint32_t side) { return side / 2 == f; });
         if (known || gap <= rounding) {
@@ -197,7 +198,7 @@ void Runner::settle_at_start()
                 sides.push_back({f, world_.begins_above(body, f)});
             }
             world_.make_one(sides);
-            world_.remember(body, sides);
+            world_.remember(body, sides, 0);
         }
         if (!fixed && !faces.empty()) settle(i, faces.size() == 1 ? faces[0] : none);
     }

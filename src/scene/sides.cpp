@@ -15,7 +15,7 @@ namespace {
 
 [[nodiscard]] double rounding_at(const Face& face, const Vector2& p) noexcept
 {
-    return World::rounding(p, 0) + World::rounding(face.at, 0);
+    return World::rounding(p, 0) + World::blur(face, 0);
 }
 
 /// Whether the chain turns to the side of its normals from one segment to the next, so that the
@@ -80,8 +80,15 @@ void World::make_one(std::vector<Side>& sides) const
     }
 }
 
-void World::remember(Body& body, const std::vector<Side>& sides) const
+void World::remember(Body& body, const std::vector<Side>& sides, double flown) const
 {
+    for (const Side& side : sides) {
+        const Face& face = faces[side.face];
+        const auto joins = [&](const Side& other) { return other.face == face.previous; };
+        if (std::ranges::none_of(sides, joins)) continue;
+        // The corner itself: beside it by a rounding, the point would be on neither segment.
+        if (norm(body.p - face.at) <= end_slack(face, body.p, flown)) body.p = face.at;
+    }
     // Repeated up to twenty times: at a corner, moving onto one line may leave another by rounding.
     for (int k = 0; k < 20; ++k) {
         bool moved = false;
@@ -99,36 +106,37 @@ void World::remember(Body& body, const std::vector<Side>& sides) const
     }
 }
 
-double World::corner_slack(const Face& face, std::uint32_t other, const Vector2& p) const
+double World::corner_slack(const Face& face, std::uint32_t other, const Vector2& p,
+                           double flown) const
 {
-    const double least = end_slack(face, p);
+    const double least = end_slack(face, p, flown);
     if (other == none) return least;
     const double sine = std::fabs(dot(turned(face.normal), faces[other].normal));
-    const double rounding = rounding_at(face, p) + rounding_at(faces[other], p);
+    const double rounding = rounding_at(face, p) + rounding_at(faces[other], p) + 2 * flown;
     return std::clamp(rounding / sine, least, std::max(least, 1e-3 * face.length));
 }
 
-bool World::holds(const Face& face, const Vector2& p) const
+bool World::holds(const Face& face, const Vector2& p, double flown) const
 {
     const double along = -dot(p - face.at, turned(face.normal));
-    return along >= -corner_slack(face, face.previous, p) &&
-           along <= face.length + corner_slack(face, face.next, p);
+    return along >= -corner_slack(face, face.previous, p, flown) &&
+           along <= face.length + corner_slack(face, face.next, p, flown);
 }
 
 bool World::passes_end(const Body& body, std::uint32_t f, bool above, const Vector2& p,
-                       const Vector2& v) const
+                       const Vector2& v, double flown) const
 {
     const Face& face = faces[f];
     const double along = -dot(p - face.at, turned(face.normal));
     for (const bool at_start : {true, false}) {
         const std::uint32_t other = at_start ? face.previous : face.next;
         const double inside = at_start ? along : face.length - along;
-        if (other == none || inside > corner_slack(face, other, p)) continue;
+        if (other == none || inside > corner_slack(face, other, p, flown)) continue;
         const Face& beside = faces[other];
         const bool up = at_start ? turns_up(beside, face) : turns_up(face, beside);
         const bool side = arrives_above(body, other, p, v) == above ? above : !up;
         if (side != above) return true;
-        if (side == up || inside > end_slack(face, p)) continue;
+        if (side == up || inside > end_slack(face, p, flown)) continue;
         // At an outer corner a point strikes only if it moves behind both segments.
         const double rate = dot(v, beside.normal) * (side ? 1 : -1);
         if (rate >= -noise(v, {})) return true;

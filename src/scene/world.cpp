@@ -78,6 +78,7 @@ World::World(const Scene& from, const SceneOptions& with)
         if (walls) wall_count = static_cast<std::uint32_t>(faces.size());
     }
     join_chains(from, wall_count, faces);
+    blur_segments();
     fixed_count = static_cast<std::uint32_t>(faces.size());
     add_moving_faces();
     islands = std::make_unique<Islands>(*this);
@@ -86,6 +87,21 @@ World::World(const Scene& from, const SceneOptions& with)
 }
 
 World::~World() = default;
+
+void World::blur_segments()
+{
+    const auto own = [](const Face& face) {
+        const Vector2 end = face.at - face.length * turned(face.normal);
+        return std::max(rounding(face.at, 0), rounding(end, 0));
+    };
+    for (Face& face : faces) {
+        if (face.kind != Face::Kind::segment) continue;
+        face.blur = own(face);
+        for (const std::uint32_t other : {face.previous, face.next}) {
+            if (other != none) face.blur = std::max(face.blur, own(faces[other]));
+        }
+    }
+}
 
 /// Adds segments with their ends, which need no faces of their own where no point meets them.
 void World::add_moving_faces()

@@ -74,6 +74,9 @@ struct Face {
     std::uint32_t surface = 0;
     std::uint32_t material = 0;
     std::uint32_t previous = none, next = none;  ///< segments of the same chain
+    /// [m] Of a segment: rounding of the distance of a point, with that of the segments that are
+    /// linked with it. Their lines meet beside the corner by as much.
+    double blur = 0;
 };
 
 /// Gap between a face and a body, and the direction in which the face pushes.
@@ -192,10 +195,12 @@ struct World {
     /// larger angle.
     void make_one(std::vector<Side>& sides) const;
     /// Stores the sides on which a point lies from now on, and undoes its displacement by rounding.
-    void remember(Body& body, const std::vector<Side>& sides) const;
-    /// Whether a point that reaches the end of a segment at p with velocity v passes there.
+    /// `flown` [m] is the rounding of the flight that has led there.
+    void remember(Body& body, const std::vector<Side>& sides, double flown) const;
+    /// Whether a point that reaches the end of a segment at p with velocity v, after a flight with
+    /// this rounding, passes there.
     [[nodiscard]] bool passes_end(const Body& body, std::uint32_t face, bool above,
-                                  const Vector2& p, const Vector2& v) const;
+                                  const Vector2& p, const Vector2& v, double flown) const;
     /// Whether a body at the foot of p on a segment leaves it over one of its ends.
     [[nodiscard]] bool leads_off(const Face& face, const Vector2& p, const Vector2& heading) const;
     /// Makes a body on a face move along it from now on: pulled by gravity, slowed by friction.
@@ -203,16 +208,16 @@ struct World {
 
     /// [m] Distance beyond its ends up to which a segment holds a point; at a sharp corner the
     /// rounding of two sides moves a point by a multiple of itself.
-    [[nodiscard]] static double end_slack(const Face& face, const Vector2& p) noexcept
+    [[nodiscard]] static double end_slack(const Face& face, const Vector2& p, double flown) noexcept
     {
-        return 32 * (rounding(p, 0) + rounding(face.at, 0));
+        return 32 * (rounding(p, 0) + blur(face, 0) + flown);
     }
     /// [m] The same at the corner with an adjacent segment. A point on both lines by rounding may
     /// be farther from a flat corner, in proportion to 1 / sine of its angle.
-    [[nodiscard]] double corner_slack(const Face& face, std::uint32_t other,
-                                      const Vector2& p) const;
+    [[nodiscard]] double corner_slack(const Face& face, std::uint32_t other, const Vector2& p,
+                                      double flown) const;
     /// Whether a point on the line of a segment is between its ends, within these distances.
-    [[nodiscard]] bool holds(const Face& face, const Vector2& p) const;
+    [[nodiscard]] bool holds(const Face& face, const Vector2& p, double flown) const;
 
     /// Rounding of a gap at these coordinates [m].
     [[nodiscard]] static double rounding(const Vector2& p, double radius) noexcept
@@ -220,7 +225,15 @@ struct World {
         return 8 * epsilon * (std::fabs(p[0]) + std::fabs(p[1]) + radius);
     }
 
+    /// [m] The part of a face in the rounding of its gap to a body.
+    [[nodiscard]] static double blur(const Face& face, double radius) noexcept
+    {
+        const bool meets_corners = radius == 0 && face.kind == Face::Kind::segment;
+        return meets_corners ? face.blur : rounding(face.at, 0);
+    }
+
 private:
+    void blur_segments();
     [[nodiscard]] Vector2 stepped_position(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Vector2 stepped_velocity(std::uint32_t i, const Instant& t) const;
     void add_moving_faces();
@@ -246,6 +259,13 @@ inline Vector2 World::velocity(std::uint32_t i, const Instant& t) const
 {
     const Body& b = bodies[i];
     return b.quartic || b.contact != none ? stepped_velocity(i, t) : speed(b, seconds(b.t, t));
+}
+
+/// [m] Rounding of a place to which a record has led in s seconds: that of a long, high flight
+/// exceeds that of its end, which may be a corner at the origin.
+[[nodiscard]] inline double rounding_of_flight(const Body& b, double s) noexcept
+{
+    return 4 * epsilon * s * (norm(b.v) + s * norm(b.a));
 }
 
 /// A first contact, `after` seconds after `from`; infinite if there is none. `presses`: the two
@@ -338,7 +358,8 @@ struct Squares {
 [[nodiscard]] Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t face);
 
 /// Gap between a face and a body that its flight has led to p.
-[[nodiscard]] FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above);
+[[nodiscard]] FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above,
+                               double flown = 0);
 /// Whether the foot of p on the line lies on the segment.
 [[nodiscard]] bool lies_on(const Face& face, const Vector2& p, double slack);
 

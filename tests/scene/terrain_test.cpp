@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -305,6 +307,95 @@ TEST(Terrain, ALineLongerThanAnyNumberOfCellsIsStruckWhereItIs)
             const auto body = static_cast<std::size_t>(i);
             EXPECT_NEAR(first[body], std::sqrt(0.002 * (i + 1)), 1e-9) << end[0] << ", disc " << i;
         }
+    }
+}
+
+/// A point that is thrown so that it meets the corner of a wedge at the origin, where coordinates
+/// have no rounding of their own, and its half plane.
+struct Wedge {
+    double low = 0, high = 0;  ///< [rad] directions of its two sides
+    Vector2 at{}, v{};
+
+    [[nodiscard]] static Vector2 side(double angle)
+    {
+        return {6 * std::cos(angle), 6 * std::sin(angle)};
+    }
+    /// [m] Distance by which p lies outside; negative inside.
+    [[nodiscard]] double outside_by(const Vector2& p) const
+    {
+        const double mean = (low + high) / 2;
+        return std::max(
+            {p[0] * std::sin(low) - p[1] * std::cos(low),
+             p[1] * std::cos(high) - p[0] * std::sin(high),
+             p[0] * std::cos(mean) + p[1] * std::sin(mean) - 6 * std::cos((high - low) / 2)});
+    }
+};
+
+constexpr double gravity = 9.81;
+
+std::optional<Wedge> random_wedge(std::mt19937_64& random)
+{
+    std::uniform_real_distribution<double> part(0, 1);
+    Wedge wedge{.low = 0.04 + 2.8 * part(random)};
+    wedge.high = std::min(3.1, wedge.low + 0.02 + (random() % 2 == 0 ? 0.1 : 1.3) * part(random));
+    const double direction = wedge.low + (wedge.high - wedge.low) * (0.2 + 0.6 * part(random));
+    const double away = 0.3 + 2 * part(random);
+    const double duration = 0.1 + 0.5 * part(random);
+    wedge.at = {away * std::cos(direction), away * std::sin(direction)};
+    wedge.v = {-wedge.at[0] / duration, -wedge.at[1] / duration + 0.5 * gravity * duration};
+    for (int k = 1; k < 40; ++k) {
+        const double t = duration * k / 40;
+        const Vector2 p{wedge.at[0] + wedge.v[0] * t,
+                        wedge.at[1] + wedge.v[1] * t - 0.5 * gravity * t * t};
+        if (wedge.outside_by(p) > -1e-3 * std::hypot(p[0], p[1])) return {};
+    }
+    return wedge;
+}
+
+TEST(Terrain, APointThatMeetsTwoSegmentsAtOnceStaysInside)
+{
+    std::mt19937_64 random(7);
+    for (int k = 0; k < 900;) {
+        const std::optional<Wedge> found = random_wedge(random);
+        if (!found) continue;
+        const Wedge& wedge = *found;
+        Scene scene({.gravity = {0, -gravity}});
+        const MaterialId material =
+            scene.material({.restitution = std::array{1.0, 0.9, 0.5, 0.0}[random() % 4],
+                            .friction = random() % 3 == 0 ? 0.3 : 0});
+        const Vector2 low = Wedge::side(wedge.low), high = Wedge::side(wedge.high);
+        if (k % 3 == 0) {
+            scene.terrain({.points = {high, {0, 0}, low}, .closed = true, .material = material});
+        } else if (k % 3 == 1) {
+            scene.terrain({.points = {low, high, {0, 0}}, .closed = true, .material = material});
+        } else {
+            scene.terrain({.points = {high, {0, 0}}, .material = material});
+            scene.terrain({.points = {low, {0, 0}}, .material = material});
+            scene.terrain({.points = {high, low}, .material = material});
+        }
+        scene.point({.at = wedge.at, .velocity = wedge.v, .material = material});
+        const SceneRun run =
+            simulate(scene, {.t_end = 3, .record_events = false, .max_events = 20'000});
+        // A point on a side is outside by the rounding of the sines and cosines of its check.
+        ASSERT_LT(wedge.outside_by(run.bodies[0].at), 1e-12) << k;
+        ++k;
+    }
+}
+
+TEST(Terrain, APointThatFallsIntoACornerBouncesForEver)
+{
+    for (const double slope : {1.0, 0.5, 2.0}) {
+        Scene scene({.gravity = {0, -gravity}});
+        scene.terrain({.points = {{-4, 4}, {0, 0}, {4, 4 * slope}}});
+        scene.point({.at = {0, 2}});
+        const SceneRun run = simulate(scene, {.t_end = 100});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+        const auto& [at, velocity, asleep] = run.bodies[0];
+        EXPECT_GT(at[1], std::max(-at[0], slope * at[0]) - 1e-12);
+        // The energy of one kilogram, to the rounding of some hundred impacts.
+        const double energy =
+            gravity * at[1] + (velocity[0] * velocity[0] + velocity[1] * velocity[1]) / 2;
+        EXPECT_NEAR(energy, 2 * gravity, 1e-11);
     }
 }
 
