@@ -599,6 +599,42 @@ TEST(SensitivityThroughEvents, SlidingMovesWithItsSurface)
     EXPECT_NEAR(s.state(1, 2), 1, 1e-9);
 }
 
+/// A block that sticks at the start, under the load sin t: x = (position, velocity).
+struct LoadedBlock {
+    using State = X2;
+    static constexpr std::size_t surface_count = 1;
+    double friction = 0.5;
+
+    [[nodiscard]] double surface(std::size_t, double, const X2& x) const { return x[1]; }
+    void field(std::size_t region, double t, const X2& x, X2& dxdt) const
+    {
+        dxdt = {x[1], std::sin(t) + ((region & 1) != 0 ? -friction : friction)};
+    }
+};
+
+// It is released at asin(mu), without a jump of its acceleration, and slides on: until then the
+// velocity does not depend on mu, from then on it falls with it as the time that has passed.
+TEST(SensitivityThroughEvents, AReleaseFromStickingHasDerivatives)
+{
+    using Sticking = Filippov<LoadedBlock>;
+    for (int k = 1; k < 20; ++k) {
+        const double mu = 0.05 * k;
+        const Parameter<Sticking> by{.with = [](double value) { return Sticking({value}); },
+                                     .nominal = mu};
+        const Sticking block({mu});
+        const X2 rest = {0, 0};
+        Options options{.t_end = 1.8, .rtol = 1e-12, .atol = 1e-12};
+        options.mode = block.start_mode(0, rest);
+        const auto s = sensitivities(block, rest, {.parameters = {by}}, options);
+        ASSERT_EQ(s.run.events.size(), 1u) << mu;
+        ASSERT_FALSE(s.undefined_at) << mu << ": " << name(s.undefined_at->reason);
+        const double slides = 1.8 - std::asin(mu);
+        // The tolerance of the run, a hundred times for the steps that add up.
+        EXPECT_NEAR(s.state(1, 2), -slides, 1e-10) << mu;
+        EXPECT_NEAR(s.state(0, 2), -slides * slides / 2, 1e-10) << mu;
+    }
+}
+
 /// A ball whose floor is known only by its sign.
 struct BlindBall : ExactBall {
     static constexpr bool unilateral = false;
