@@ -59,7 +59,7 @@ inline void EventEngine<X, single>::check_inside()
 {
     if constexpr (is_small<X> && std::is_trivially_copyable_v<X>) {
         // Components that no guard reads are not computed.
-        X x{};
+        X x(step_.x0().size());
         step_.template peek<InsideOf>(x);
         bank_.sample_inside(step_, x, calls());
     } else {

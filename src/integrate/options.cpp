@@ -66,6 +66,7 @@ void detail::validate_but_for_end(const Options& options, bool step_required, st
                 o.rtol);
         require(std::isfinite(o.h_min) && o.h_min >= 0,
                 "h_min must be zero or positive, and finite", o.h_min);
+        require(o.h_max == o.h_max, "h_max must be a length of time, or infinite", o.h_max);
         if (!(o.h_max > o.h_min)) {
             refuse_options(fmt::format("h_max must be above h_min = {}, got {}", o.h_min, o.h_max));
         }

@@ -1,8 +1,19 @@
 #include <fmt/format.h>
 
+#include <stdexcept>
+
 #include "ricochet/integrate/run.hpp"
 
 namespace ricochet {
+
+void detail::throw_no_solution(bool no_steps)
+{
+    throw std::invalid_argument(
+        no_steps
+            ? "Solution: no step has been kept; expected Options::record_steps, and a run of at "
+              "least one step"
+            : "Solution: expected a time, got NaN");
+}
 
 std::string_view name(Outcome outcome) noexcept
 {

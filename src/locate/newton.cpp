@@ -328,6 +328,13 @@ Location Search::run()
 
 Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
 {
+    // Second differences over the narrowest brackets, which the steps of Newton's method are judged
+    // by, would overflow.
+    constexpr double largest = 1e280;
+    for (const double g : {lo.value, hi.value, lo.rate, hi.rate}) {
+        if (std::fabs(g) > largest) [[unlikely]]
+            return Bisection{}.locate(path, lo, hi, tolerance);
+    }
     return Search(path, {lo, hi}, tolerance).run();
 }
 

@@ -16,7 +16,8 @@ static inline int ball_flow(void* user, rc_mode mode, double t, const double* x,
 static inline int ball_guard(void* user, size_t which, rc_mode mode, double t, const double* x,
                              size_t n, double* g)
 {
-    (void)user, (void)which, (void)mode, (void)t, (void)n;
+    (void)user, (void)which, (void)mode, (void)t;
+    CHECK(n == 2);
     *g = x[0];
     return 0;
 }

@@ -1130,6 +1130,22 @@ TEST(Events, TheSolutionHasALimitOnEitherSideOfAnEvent)
     EXPECT_EQ(run.solution(3), run.x);
 }
 
+TEST(Events, ASolutionWithoutStepsOrTimeIsRefused)
+{
+    const BouncingBall ball;
+    const auto kept = integrate(ball, X{10, 0}, {.t_end = 1, .record_steps = true});
+    const auto dropped = integrate(ball, X{10, 0}, {.t_end = 1});
+    const auto none = integrate(ball, X{10, 0}, {.t_end = 0, .record_steps = true});
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_THROW((void)kept.solution(nan), std::invalid_argument);
+    EXPECT_THROW((void)kept.solution.before(nan), std::invalid_argument);
+    for (const auto& run : {dropped, none}) {
+        EXPECT_THROW((void)run.solution(0), std::invalid_argument);
+        EXPECT_THROW((void)run.solution.before(0), std::invalid_argument);
+        EXPECT_THROW((void)run.solution.mode(0), std::invalid_argument);
+    }
+}
+
 TEST(Events, TheSolutionEndsWithTheStateAfterTheLastReset)
 {
     const BouncingBall ball;

@@ -143,5 +143,30 @@ TEST(Newton, CloseRootsOfASmoothGuardAreNotTakenForNoise)
     }
 }
 
+/// A pendulum of small swings whose guard has any size.
+struct Magnified {
+    using State = std::array<double, 2>;
+    double factor = 1, level = 0;
+
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -x[0]}; }
+    [[nodiscard]] double guard(double, const State& x) const { return factor * (x[0] - level); }
+    void reset(double, State&) const {}
+};
+
+TEST(Newton, GuardsOfAnySizeHaveTheirEventsAtTheSameTimes)
+{
+    for (int k = 1; k < 200; ++k) {
+        const double level = 1 - 0.002 * k;
+        for (const double factor : {1e-300, 1.0, 1e280, 1e290, 1e298, 1e304, 1.2e308}) {
+            const auto run =
+                integrate(Magnified{factor, level}, {1.0, 0.0}, {.t_end = 2.2, .rtol = 1e-12});
+            ASSERT_EQ(run.events.size(), 1u) << factor << ", " << level;
+            // That of the run, and the rounding of the level where the guard is flat: 1e-16 / 0.06.
+            EXPECT_NEAR(run.events[0].t, std::acos(level), 1e-10) << factor << ", " << level;
+            EXPECT_LT(run.events[0].error, 1e-10) << factor << ", " << level;
+        }
+    }
+}
+
 }  // namespace
 }  // namespace ricochet::test::newton_test

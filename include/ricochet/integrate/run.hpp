@@ -21,6 +21,10 @@
 
 namespace ricochet {
 
+namespace detail {
+[[noreturn]] void throw_no_solution(bool no_steps);
+}
+
 // Outcomes of runs.
 
 /// How a run or a motion ended.
@@ -140,7 +144,9 @@ public:
     [[nodiscard]] std::size_t size() const noexcept { return pieces_.size(); }
 
     /// x at time t [s], after an event at t. Before the first and after the last
-    /// recorded step, the nearest computed state. Needs at least one step.
+    /// recorded step, the nearest computed state.
+    /// @throws std::invalid_argument, as do `before` and `mode`, if no step has been recorded, as
+    /// without `Options::record_steps`, and for a time that is NaN.
     [[nodiscard]] State operator()(double t) const { return evaluate(pieces_[after(t)], t); }
 
     /// x at time t [s], before an event at t.
@@ -296,8 +302,9 @@ private:
     }
 
     /// The last piece that starts at or before t.
-    [[nodiscard]] std::size_t after(double t) const noexcept
+    [[nodiscard]] std::size_t after(double t) const
     {
+        if (pieces_.empty() || t != t) detail::throw_no_solution(pieces_.empty());
         std::size_t first = 0, end = pieces_.size();
         while (end - first > 1) {
             const std::size_t middle = first + (end - first) / 2;
