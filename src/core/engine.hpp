@@ -333,6 +333,14 @@ protected:
         bool located;
 
         [[nodiscard]] bool knows_flow() const noexcept { return engine.system_->flow; }
+        /// Guards that fire at the start of a step have been armed beyond.
+        [[nodiscard]] Crossing direction(std::size_t i) const noexcept
+        {
+            const GuardRecord& record = std::as_const(engine.bank_)[i];
+            if (record.info.crossing != Crossing::either) return record.info.crossing;
+            const Side left = located ? record.side : opposite(record.side);
+            return left == Side::below ? Crossing::rising : Crossing::falling;
+        }
         [[nodiscard]] bool enabled(std::size_t i, Mode mode) const
         {
             return engine.system_.enabled_in(i, mode);
