@@ -208,7 +208,9 @@ struct MonitorOptions {
 /// and `resume`, called with the rate at x⁺, arms every guard there: on its sign, or on its surface
 /// on the sign of its rate. It returns `stands` if the next step begins at x⁺, and another `cut` at
 /// the same instant if x⁺ has carried guards across their surfaces. `rests` says that the state
-/// stays as it is up to the next time event, and `ended` that the run is over.
+/// stays as it is up to the next time event, and `ended` that the run is over. Where a rest holds a
+/// part of a state that moves, the verdict is `stands`, and `held()` names the components to keep;
+/// they go free at a `cut` in which no guard has fired, if no event sets them free before.
 ///
 /// Required of the host: t0 and x0 are the end of the last step, or the instant and the state of
 /// the last cut, to the bit; t0 + h does not lie beyond `must_stop_at`; between `cut` and `resume`
@@ -337,7 +339,7 @@ public:
     }
 
     /// Tells the monitor that the state has been kept until t [s], at most `must_stop_at`. Returns
-    /// a cut at a time event.
+    /// a cut at a time event, and before, without guards, where the flow lifts what rests.
     [[nodiscard]] Verdict hold(double t) { return monitor_->hold(t); }
 
     /// The set of events at which the last step was cut.
@@ -369,6 +371,10 @@ public:
 
     /// The next time event [s], which no step may pass; infinite if there is none.
     [[nodiscard]] double must_stop_at() const noexcept { return monitor_->must_stop_at(); }
+
+    /// The components that a rest holds, ascending: the host keeps them constant in its next steps,
+    /// while the others flow. They change where a set is resumed, and at no other time.
+    [[nodiscard]] std::span<const std::size_t> held() const noexcept { return monitor_->held(); }
 
     /// Time [s] up to which no guard needs a check, by the bounds that the system declares or a
     /// gate (`Planned`, `Certified`, ...): the host may go there in steps that it does not show, by

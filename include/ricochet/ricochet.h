@@ -437,6 +437,7 @@ typedef enum rc_event_kind {
     RC_TOUCH = 1,        /**< the guard reached its surface and turned back */
     RC_TIME = 2,         /**< a time event */
     RC_ACCUMULATION = 3, /**< the limit of infinitely many events */
+    RC_MODE = 4,         /**< the flow lifts what the rest of the guard held */
     RC_JUMP = 7          /**< the guard changed sign without a zero */
 } rc_event_kind;
 
@@ -649,6 +650,11 @@ RC_API double rc_monitor_time(rc_monitor* monitor, double* remainder);
 RC_API const double* rc_monitor_state(rc_monitor* monitor);
 /** The mode there; UINT32_MAX before the start, and for a handle that cannot be used. */
 RC_API rc_mode rc_monitor_mode(rc_monitor* monitor);
+
+/** The components that a rest holds, ascending, `*count` of them: the host keeps them constant in
+ *  its next steps, while the others flow. Valid until the next call that starts, advances, restores
+ *  or frees the monitor. Null where nothing is held, and for a handle that cannot be used. */
+RC_API const size_t* rc_monitor_held(rc_monitor* monitor, size_t* count);
 
 /** The next time event [s], which no step may pass; infinite if there is none; NaN before the
  *  start, and for a handle that cannot be used. */

@@ -135,7 +135,7 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         With SciPy's ``t, y, sol, t_events, y_events, nfev, njev, nlu, status, message, success``;
         ``y_events`` are the states before resets. At a reset ``t`` holds its time twice where ``t_eval``
         is not given. New: ``y_events_after``, the states after; ``kinds``, for every event
-        'crossing', 'touch', 'jump' or 'accumulation'; ``modes``, before and after; ``outcome``
+        'crossing', 'touch', 'jump', 'accumulation' or 'mode'; ``modes``, before and after; ``outcome``
         and ``statistics``, whose ``evidence`` counts why steps were taken to hold no event.
 
     If ``fun`` or an event raises an exception, it is passed on unchanged, with the `Run` so far as

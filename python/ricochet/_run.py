@@ -28,7 +28,7 @@ class Kind(Named):
     TOUCH = 1         #: the guard reached its surface and turned back
     TIME = 2          #: a time event
     ACCUMULATION = 3  #: the limit of infinitely many events
-    MODE = 4
+    MODE = 4          #: the flow lifts what the rest of the guard held
     STICK = 5
     SLIP = 6
     JUMP = 7          #: the guard changed sign without a zero

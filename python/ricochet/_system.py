@@ -19,7 +19,7 @@ MOST_EVENTS = 2**32 - 1
 _OF_GUARDS = {name: name for name in (
     "value", "direction", "reset", "rest", "rate", "enabled", "in_modes", "unilateral", "boolean",
     "degree", "touch", "stop_after", "at_start", "at_entry", "speed_bound", "acceleration_bound", "lower_bound",
-    "upper_bound", "lipschitz", "resets")}
+    "upper_bound", "lipschitz", "resets", "directed")}
 _OF_GUARDS["terminal"] = "stop_after"
 
 
@@ -65,6 +65,8 @@ class Guard:
     reset : function (t, x) -> x
         The state after the event; with modes a mode, or a tuple (mode, x). Without it the event is
         only recorded.
+    directed : bool
+        ``reset`` takes the direction of the crossing as last argument, -1 or 1.
     rest : function (t, x) -> x
         The state after an accumulation of infinitely many events.
     rate : function (t, x, dxdt) -> float
@@ -98,7 +100,7 @@ class Guard:
                  enabled=None, in_modes=None, unilateral=False, boolean=False, degree=0,
                  touch=0.0, stop_after=0, at_start=False, at_entry=False, speed_bound=None,
                  acceleration_bound=None, lower_bound=None, upper_bound=None, lipschitz=1.0,
-                 resets=True):
+                 resets=True, directed=False):
         if isinstance(in_modes, Iterator):  # read for every run
             in_modes = list(in_modes)
         self._functions = dict(value=value, rate=rate, reset=reset, rest=rest, enabled=enabled,
@@ -107,7 +109,7 @@ class Guard:
         self._numbers = dict(direction=direction, in_modes=in_modes, unilateral=unilateral,
                              boolean=boolean, degree=degree, touch=touch, stop_after=stop_after,
                              at_start=at_start, at_entry=at_entry, lipschitz=lipschitz,
-                             resets=resets)
+                             resets=resets, directed=directed)
         self.name = name
         self._origin = self  # shared by the guards that ``@name.reset`` and so on make of this one
 

@@ -88,8 +88,9 @@ protected:
           cascade_{x0}
     {
         const Screening screening = setup.detector.screening;
-        on_series_ = step_.has_guard_series() && !defers_ && !predicts_ &&
-                     (screening == Screening::extremum || screening == Screening::every);
+        may_be_on_series_ = !defers_ && !predicts_ &&
+                            (screening == Screening::extremum || screening == Screening::every);
+        on_series_ = may_be_on_series_ && step_.has_guard_series();
         if (defers_) planner_.emplace(system_, finders_, x0, backward_, bank_.size());
     }
 
@@ -333,6 +334,14 @@ protected:
         bool located;
 
         [[nodiscard]] bool knows_flow() const noexcept { return engine.system_->flow; }
+        /// Guards that fire at the start of a step have been armed beyond.
+        [[nodiscard]] Crossing direction(std::size_t i) const noexcept
+        {
+            const GuardRecord& record = std::as_const(engine.bank_)[i];
+            if (record.info.crossing != Crossing::either) return record.info.crossing;
+            const Side left = located ? record.side : opposite(record.side);
+            return left == Side::below ? Crossing::rising : Crossing::falling;
+        }
         [[nodiscard]] bool enabled(std::size_t i, Mode mode) const
         {
             return engine.system_.enabled_in(i, mode);
@@ -480,10 +489,10 @@ protected:
     /// Work that is due once the flow at the start of the step is known.
     enum class Pending : std::uint8_t {
         nothing,
-        settle,     ///< guards have fired: handle their accumulations, then arm all guards
-        arm,        ///< a fired guard has come to rest: arm all guards
-        arm_stuck,  ///< the same, for a guard that its reset did not turn back
-        hold,       ///< the whole system has come to rest
+        settle,        ///< guards have fired: handle their accumulations, then arm all guards
+        arm,           ///< a fired guard has come to rest: arm all guards
+        arm_stuck,     ///< the same, for a guard that its reset did not turn back
+        arm_released,  ///< components that a rest held go free: arm all guards
     };
 
     /// Arms the guards with the flow at x⁺. True: another set has been applied at the same
@@ -554,9 +563,142 @@ protected:
     /// Brings guard i to rest: its events accumulate `ahead` [s] from here, known to `error` [s].
     void come_to_rest(std::size_t i, double ahead, double error);
 
-    /// Whether guard i keeps its value while the state stands still, because its surface does not
-    /// move; tested at times from a thousandth of the remaining time to all of it.
-    [[nodiscard]] bool stays_on_surface(std::size_t i);
+    // --- what a rest holds ---
+
+    /// A guard that has come to rest.
+    struct Rested {
+        std::size_t guard = 0;
+        double band = 0;   ///< |g| where it fired last
+        double ahead = 0;  ///< [s] from there to the limit, for which the state stood still
+    };
+
+    /// Components that stand still since the rest of a guard on whose surface the flow presses.
+    struct Hold {
+        std::size_t guard = 0;
+        double inward = 1;    ///< sign of the guard inside
+        double rounding = 0;  ///< of its value there
+        double level = 0;     ///< |g| up to which it is on its surface
+        double ahead = 0;     ///< [s] over which the flow without the hold is followed; 0: never
+        boost::container::small_vector<std::size_t, 8> components{};
+    };
+
+    using Holds = boost::container::small_vector<Hold, 2>;
+
+    /// A short part of a motion that is followed for the sake of a guard.
+    struct Following {
+        std::size_t guard;
+        double t;  ///< [s]
+        const X* x;
+        double ahead;  ///< [s]
+        bool frozen;   ///< the flow is that at t
+    };
+
+    /// Change of a guard along `flow(t, x, dxdt)`, by Heun's step.
+    template <class Flow>
+    [[nodiscard]] double drift(const Following& by, const Flow& flow);
+    /// The same along the flow in which nothing is held.
+    [[nodiscard]] double free_drift(const Following& by);
+
+    /// Whether the flow presses on a guard that has come to rest: it is on its surface, and its
+    /// first derivative that is not zero points outward. Fills in `hold`, but not its components.
+    [[nodiscard]] bool presses(const Rested& rested, Hold& hold);
+
+    /// Holds what the rests of this instant have to hold. The run ends where that is not possible.
+    void hold_rested();
+
+    /// Lets the components that are not held catch up with the limit of the events.
+    void carry_on(double ahead);
+
+    /// Finds the components that `rest` sets to a value that depends neither on the state, by two
+    /// displacements of all of them, nor on the time. False: there are none, or one of them is set
+    /// to a value that moves with the time.
+    [[nodiscard]] bool finds_components(Hold& hold);
+
+    /// Whether the guard stays on its surface for the length of a step while components are held.
+    [[nodiscard]] bool stays_held(const Hold& hold);
+
+    /// Makes the step hold the components of all holds.
+    void renew_holds();
+    /// The same after the holds have been put back, with guards that already know it.
+    void resume_holds()
+    {
+        const bool changed = changed_holds_;
+        rested_.clear();
+        renew_holds();
+        changed_holds_ = changed;
+    }
+    void forget_holds()
+    {
+        resting_ = false;
+        rested_.clear();
+        if (holds_.empty()) return;
+        holds_.clear();
+        renew_holds();
+    }
+
+    [[nodiscard]] bool is_held(std::size_t i) const noexcept
+    {
+        return std::any_of(holds_.begin(), holds_.end(),
+                           [i](const Hold& hold) { return hold.guard == i; });
+    }
+
+    /// Lets the components of hold k go free; the record of its accumulation begins again.
+    void release(std::size_t k);
+    /// Lets go what a reset has changed, or everything where the mode has changed.
+    void release_changed(const X& before, const X& after, bool changes_mode);
+    /// Lets go, with an event, what the flow lifts at the start of the step. False: nothing.
+    [[nodiscard]] bool release_lifted();
+    void release_here(std::size_t k);
+
+    /// Positive where the flow lifts the guard of a hold from its surface.
+    [[nodiscard]] double lift(const Hold& hold, double t, const X& x);
+
+    /// Where a function rises above zero first; infinity: nowhere.
+    struct Rise {
+        double at = infinity;  ///< [s]
+        double bend = 0;       ///< deviation from a straight line, as a part of its size
+    };
+    /// Where the flow lifts something first.
+    struct Release {
+        std::size_t hold = no_guard;  ///< number of the hold; `no_guard`: nothing is lifted
+        double at = 0;                ///< [s] offset
+        double bend = 0;              ///< as in `Rise`
+    };
+    /// @param state_at  called as state_at(s, x), writes the state at offset s into x
+    template <class StateAt>
+    [[nodiscard]] Release first_release(double length, const StateAt& state_at);
+    /// Divides [0, length] until a straight line through the ends of a part says where a function,
+    /// not positive at 0, is negative: to a 4096th of the length, and in at most 256 parts.
+    template <class Value>
+    [[nodiscard]] Rise first_rise(const Value& value, double length);
+    /// The end of the bracket of a root, to rounding, at which the function is positive.
+    template <class Value>
+    [[nodiscard]] double narrow(const Value& value, double lo, double hi);
+
+    /// The guard of a hold that has left its surface; `no_guard`: none has.
+    [[nodiscard]] std::size_t guard_left_at(double t, const X& x);
+
+    /// Whether nothing moves and nothing will, up to the next time event or the end: all rates are
+    /// zero, and the flow without holds and all guards are at four later times what they are now.
+    /// (Of a host, whose end is not known, only the guards, over a million steps.)
+    [[nodiscard]] bool stands_still();
+    [[nodiscard]] bool guards_stand_still(double t);
+
+    /// Whether holds that have been read are those of a state of n components.
+    [[nodiscard]] bool holds_fit(std::size_t n) const noexcept
+    {
+        return std::all_of(holds_.begin(), holds_.end(), [&](const Hold& hold) {
+            return hold.guard < bank_.size() &&
+                   std::all_of(hold.components.begin(), hold.components.end(),
+                               [n](std::size_t component) { return component < n; });
+        });
+    }
+    /// Saves or reads the holds.
+    template <class Visitor>
+    void visit_holds(Visitor&& visit);
+
+    /// Arms every guard after a rest, with what it holds.
+    void arm_after_rest();
 
     void enable_guards();
 
@@ -713,7 +855,8 @@ protected:
     bool timed_;
     std::conditional_t<single, Never, bool> defers_;  ///< only the loop of any number plans
     bool predicts_;
-    bool on_series_ = false;  ///< guards are power series over each step
+    bool may_be_on_series_ = false;  ///< where the method gives guards as power series
+    bool on_series_ = false;         ///< guards are power series over each step
     Options options_;
     MeterOfRun meter_;
     EventResolution resolution_;
@@ -737,7 +880,10 @@ protected:
     std::uint32_t timer_at_once_ = 0;
     bool ended_ = false;
     bool endless_ = false;  ///< the end of the options is infinite
-    bool resting_ = false;
+    bool resting_ = false;  ///< something is held, and nothing moves
+    Holds holds_;
+    boost::container::small_vector<Rested, 2> rested_;  ///< at this instant
+    bool changed_holds_ = false;                        ///< since guards were enabled
     bool stops_ = false;
     std::size_t stopper_ = no_guard;  ///< the guard of the set that ends the run
     bool asked_ = false;              ///< the network has been asked about the current step

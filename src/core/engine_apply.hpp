@@ -42,6 +42,7 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
         timer_idles_ = !changes && (on_time || (timer_idles_ && !located));
     }
     leaves_phase_ = true;
+    if (!holds_.empty()) release_changed(search_.before(), resets_.after(), changed_mode_);
     step_.restart(at, resets_.after(), resets_.mode());
     for (const auto& [component, lost] : left_alone_) step_.set_remainder(component, lost);
     if (on_time) step_.hold(passed_ = t);
@@ -199,8 +200,6 @@ inline void EventEngine<X, single>::apply_time_event()
     leave_from_start();
     transform(true, false);
     note_left_alone(false);
-    resting_ =
-        resting_ && resets_.mode() == step_.mode() && same_state(resets_.after(), step_.x0());
     apply(false, true);
 }
 

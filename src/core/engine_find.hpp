@@ -11,7 +11,9 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::deserves_search(bool& cleared)
 {
     cleared = false;
-    if (predicts_) {
+    if (predicts_ && !holds_.empty()) {
+        asked_ = false;  // a network knows the flow, and not what a rest leaves of it
+    } else if (predicts_) {
         meter_.review(run_.statistics);
         asked_ = meter_.asks();
         if (asked_) cleared = ask_network();

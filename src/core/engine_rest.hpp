@@ -28,7 +28,7 @@ inline bool EventEngine<X, single>::rest_fired()
             rested = true;
         }
     }
-    if (rested && !ended_) pending_ = resting_ ? Pending::hold : Pending::arm;
+    if (rested && !ended_) pending_ = Pending::arm;
     return rested;
 }
 
@@ -181,7 +181,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
         run_.other_guard = other_of_cycle(i);
         return;
     }
-    if (resting_ || ended_) return;
+    if (ended_) return;
     const X before = step_.x0();
     const Mode mode = step_.mode();
     ahead = std::min(ahead, step_.until(options_.t_end));
@@ -217,6 +217,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     }
     leaves_phase_ = false;
     enters_mode_ = mode_after != mode;
+    if (!holds_.empty()) release_changed(before, after, enters_mode_);
     step_.restart(ahead, 0, after, mode_after);
     start_beyond_time_event();
     for (const std::size_t k : search_.fired()) {
@@ -224,25 +225,8 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     }
     bank_[i].intervals.come_to_rest();
     bank_.row().clear();
-    bank_[i].band = 0;
-    resting_ = bank_.size() == 1 && !system_->moded;
-    if (resting_ && !stays_on_surface(i)) end(Outcome::zeno, i);
-}
-
-template <class X, bool single>
-inline bool EventEngine<X, single>::stays_on_surface(std::size_t i)
-{
-    const auto guard = bank_.view(i, step_.mode(), calls());
-    const double left = step_.until(options_.t_end);
-    const bool ends = std::isfinite(left) && !endless_;  // a host declares no end
-    const double span = ends ? left : 1e6 * h_next_;
-    const double rounding = rounding_of(i);
-    const double g = guard.value(step_.time(0), step_.x0());
-    for (const double part : {0.001, 0.0381966, 0.381966, 1.0}) {
-        const double later = guard.value(step_.time(part * span), step_.x0());
-        if (!(std::fabs(later - g) <= rounding)) return false;
-    }
-    return true;
+    const double band = std::exchange(bank_[i].band, 0);
+    if (!enters_mode_) rested_.push_back({i, band, ahead});
 }
 
 }  // namespace ricochet::detail

@@ -14,9 +14,8 @@ inline bool EventEngine<X, single>::settle()
     const bool at_start = due == Pending::nothing;
     switch (due) {
         case Pending::nothing: break;
-        case Pending::hold: ask_timer(); break;
         case Pending::settle:
-            if (guarded_ && !resting_ && !rest_fired()) arm_all();
+            if (guarded_ && !rest_fired()) arm_all();
             if (on_time_ && !ended_) {
                 find_time_event(After::time_event);
             } else {
@@ -24,19 +23,33 @@ inline bool EventEngine<X, single>::settle()
             }
             break;
         case Pending::arm_stuck:
-            arm_all();
-            if (still_stuck(stuck_)) end(Outcome::zeno, stuck_);
+            arm_after_rest();
+            if (!ended_ && still_stuck(stuck_)) end(Outcome::zeno, stuck_);
             ask_timer();
             break;
         case Pending::arm:
+            arm_after_rest();
+            ask_timer();
+            break;
+        case Pending::arm_released:
             arm_all();
             ask_timer();
             break;
     }
     if (ended_) return false;
     if (pending_ != Pending::nothing) return true;
-    if (!resting_ && !search_.fired().empty()) return apply_next_set(due_here_ && at_start);
-    return due_here_ && apply_due_time_event();
+    if (!search_.fired().empty()) return apply_next_set(due_here_ && at_start);
+    if (!holds_.empty() && release_lifted()) return true;
+    if (due_here_) return apply_due_time_event();
+    resting_ = !holds_.empty() && stands_still();
+    return false;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::arm_after_rest()
+{
+    hold_rested();
+    if (!ended_) arm_all();
 }
 
 template <class X, bool single>
@@ -66,7 +79,7 @@ inline bool EventEngine<X, single>::apply_next_set(bool on_time)
     if (ended_) return false;
     search_.fired().clear();
     search_.fired().push_back(stuck_);
-    pending_ = resting_ ? Pending::hold : Pending::arm_stuck;
+    pending_ = Pending::arm_stuck;
     return true;
 }
 
@@ -178,7 +191,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::enable_guards()
 {
     for (std::size_t i = 0; i < bank_.size(); ++i) {
-        const bool enabled = system_.enabled_in(i, step_.mode());
+        const bool enabled = system_.enabled_in(i, step_.mode()) && !is_held(i);
         const GuardRecord& now = std::as_const(bank_)[i];
         const bool enters = enters_mode_ && now.info.at_entry;
         if (enabled == now.enabled && !now.newly_enabled && !enters) continue;
@@ -188,6 +201,7 @@ inline void EventEngine<X, single>::enable_guards()
         record.enabled = enabled;
     }
     bank_.heed_enabled();
+    changed_holds_ = false;
 }
 
 template <class X, bool single>
@@ -200,7 +214,7 @@ inline void EventEngine<X, single>::arm_all()
         widest = std::max(widest, bank_[i].band);
     }
     search_.fired().clear();
-    if (system_->moded) enable_guards();
+    if (system_->moded || changed_holds_) enable_guards();
     bank_.await_none();
     newly_armed_ = true;
     watching_ = false;

@@ -202,6 +202,9 @@ public:
         if (!this->series_converge(step.h())) this->see({}, false);
     }
 
+    /// The guards are not power series any more.
+    void leave_series() { this->see({}, false); }
+
     /// Part of the step that has not been examined for guard i; `end` is the sample at its end.
     [[nodiscard]] Watch watch(std::size_t i, const Step<X>& step, const GuardSample& end) const
     {

@@ -218,6 +218,7 @@ private:
     using Engine::finders_;
     using Engine::guarded_;
     using Engine::h_next_;
+    using Engine::holds_;
     using Engine::infinity;
     using Engine::last_h_;
     using Engine::meter_;
@@ -304,6 +305,7 @@ private:
         GuardBank<X, single> bank;
         double flight_start = 0, longest_step = 0, last_h = 0, time_event = 0;
         bool resting = false, watching = false;
+        typename Engine::Holds holds{};
     };
 
     /// Finds the deadlines of guards again after an exception has left them half renewed.
@@ -338,7 +340,7 @@ private:
 
     [[nodiscard]] bool may_run_quietly() const noexcept
     {
-        return quiet_ && !resting_ && run_.statistics.steps < next_review_ &&
+        return quiet_ && holds_.empty() && run_.statistics.steps < next_review_ &&
                !options_.record_steps && next_sample_ >= options_.sample_times.size() &&
                bank_.is_steady();
     }
@@ -533,8 +535,17 @@ private:
         return std::max(options_.h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
     }
 
-    /// Keeps a system without modes at rest until a time event or the end.
+    /// Keeps a motion at rest until a time event or the end.
     void hold(double remaining);
+
+    /// Takes a step of a motion of which something is held.
+    void advance_held(double remaining);
+    /// Shortens the step to where the flow lifts something that is held. False: the run has ended.
+    [[nodiscard]] bool shorten_to_release();
+    /// Whether the current step, if it stands, ends there.
+    [[nodiscard]] bool ends_at_release() const noexcept { return step_.h() == release_at_; }
+    /// Accepts it, and lets that go free.
+    void pass_to_release();
 
     // --- events ---
 
@@ -652,6 +663,8 @@ private:
     std::uint64_t next_review_ = 0;  ///< number of steps at which to compare with the options
     Review stall_review_, set_review_, pace_review_;
     bool is_last_ = false;
+    double release_at_ = infinity;  ///< [s] offset at which hold number `released_` is lifted
+    std::size_t released_ = 0;
     std::size_t next_sample_ = 0;
     std::size_t shown_samples_ = 0;  ///< number of samples shown by `advance`
     std::size_t shown_records_ = 0;  ///< and of events among those recorded

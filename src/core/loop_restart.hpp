@@ -27,7 +27,8 @@ void Loop<X, single>::restart(double t, const X& x, Mode mode)
 template <class X, bool single>
 void Loop<X, single>::start_at(double t, const X& x, Mode mode)
 {
-    ended_ = resting_ = this->stops_ = replans_ = false;
+    ended_ = this->stops_ = replans_ = false;
+    this->forget_holds();
     run_.outcome = Outcome::reached_end;
     this->forget_cause();
     pending_ = Engine::Pending::nothing;
@@ -68,7 +69,8 @@ void Loop<X, single>::drop_from(double t)
     while (!events.empty() && lies_before(t, events.back().t)) {
         const Event<X>& event = events.back();
         --run_.statistics.events;
-        if (event.guard != no_guard && event.kind != EventKind::accumulation) {
+        const bool fired = event.kind != EventKind::accumulation && event.kind != EventKind::mode;
+        if (event.guard != no_guard && fired) {
             --bank_[event.guard].events;
         }
         events.pop_back();

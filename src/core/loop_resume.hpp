@@ -73,6 +73,7 @@ void Loop<X, single>::copy_to_mark()
     mark_->last_h = last_h_;
     mark_->time_event = time_event_;
     mark_->resting = resting_;
+    mark_->holds = holds_;
     mark_->watching = watching_;
     mark_->everything = true;
 }
@@ -109,6 +110,8 @@ void Loop<X, single>::go_back_to_mark()
         last_h_ = mark.last_h;
         time_event_ = mark.time_event;
         resting_ = mark.resting;
+        holds_ = mark.holds;
+        this->resume_holds();
         watching_ = mark.watching;
     } else if (defers_) {
         step_.put_back_rate();

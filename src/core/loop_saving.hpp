@@ -40,6 +40,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
 template <class X, bool single>
 inline void Loop<X, single>::go_on_from_place()
 {
+    this->resume_holds();
     step_.restart(place_);
     next_review_ = 0;
     watching_ = replans_ = due_here_ = false;
@@ -63,7 +64,7 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
     visit(longest_step_);
     visit(time_event_);
     if (timed_) visit(place_.is_beyond);
-    visit(resting_);
+    this->visit_holds(visit);
     visit(ended_);
     visit(run_.outcome);
     visit_cause(visit);

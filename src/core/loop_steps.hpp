@@ -91,7 +91,7 @@ inline void Loop<X, single>::advance_from_here(const Advance& how)
         return end(Outcome::cancelled);
     }
     if (defers_) step_.keep_rate();
-    if (resting_) return hold(remaining);
+    if (!holds_.empty()) return advance_held(remaining);
     if (defers_) return advance_by_plan(remaining, how);
     if (!take_step(remaining)) return;
     mark_what_lasts();
@@ -294,6 +294,63 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
     search_.fired().push_back(i);
     settle_and_record();
     return true;
+}
+
+template <class X, bool single>
+void Loop<X, single>::advance_held(double remaining)
+{
+    if (resting_) return hold(remaining);
+    if (defers_) this->watch_all();  // bounds are those of the flow, and not of what is left of it
+    mark_everything();
+    if (!take_step(remaining) || !shorten_to_release()) return;
+    if (handle_events()) return;
+    ends_at_release() ? pass_to_release() : pass();
+}
+
+template <class X, bool single>
+bool Loop<X, single>::shorten_to_release()
+{
+    const double h = step_.h();
+    const auto release = this->first_release(h, [&](double s, X& x) {
+        s == 0 ? assign(x, step_.x0()) : s == h ? assign(x, step_.x1()) : step_.interpolate(s, x);
+    });
+    release_at_ = infinity;
+    // Where the lift is bent by more than a sixteenth the steps are not to grow.
+    constexpr double most = 1.0 / 16;
+    if (error_controlled_ && release.bend > 0) {
+        const double factor = std::max(0.5, std::sqrt(most / release.bend));
+        h_next_ = std::min(h_next_, h * factor);
+    }
+    if (release.hold == no_guard) {
+        const std::size_t left = this->guard_left_at(step_.time(h), step_.x1());
+        if (left != no_guard) end(Outcome::zeno, left);
+        return !ended_;
+    }
+    if (release.at < h) {
+        is_last_ = time_event_due_ = false;
+        if (!step_.attempt(release.at)) {
+            end_step(Outcome::non_finite);
+            return false;
+        }
+    }
+    if (!time_event_due_) {  // which would come first, and what it leaves is lifted after it
+        release_at_ = step_.h();
+        released_ = release.hold;
+    }
+    return true;
+}
+
+template <class X, bool single>
+void Loop<X, single>::pass_to_release()
+{
+    accept();
+    release_at_ = infinity;
+    limit_next_step(step_.start().value);
+    this->release_here(released_);
+    if (error_controlled_ && options_.step == 0 && step_.until(options_.t_end) > 0) {
+        h_next_ = std::min(h_next_, initial_step(step_, options_, step_.until(options_.t_end)));
+    }
+    settle_and_record();
 }
 
 template <class X, bool single>

@@ -46,7 +46,8 @@ public:
 
     /// Applies the resets of the guards that fired to the state `before`, and the reset of a time
     /// event. `bank` knows which guards have a reset.
-    /// @param stands  whether guard i still has its event in a mode and a state
+    /// @param stands  whether guard i still has its event in a mode and a state, and in which
+    ///                direction it has crossed
     template <class Bank, class Stands>
     void apply(const SystemAt<X>& system, const Bank& bank, const FiredSet& set, const X& before,
                const Stands& stands)
@@ -62,6 +63,7 @@ public:
         if (fired.size() == 1 && !on_time && !system->reset_set) {
             const std::size_t i = fired[0];
             if (!system->reset || !bank[i].info.resets) return;
+            tell_direction(system, stands.direction(i));
             mode_ = ask(i, mode, [&] { return system->reset(system.door(), i, mode, t, after_); });
             return;
         }
@@ -78,6 +80,8 @@ public:
         }
         if (on_time && system->time_reset) add_member(time_event_reset);
         const auto reset = [&](const Member& member, Mode in, X& x) {
+            if (member.who != time_event_reset)
+                tell_direction(system, stands.direction(member.who));
             return ask(member.who, in, [&] {
                 return member.who == time_event_reset
                            ? system->time_reset(system.door(), in, t, x)
@@ -107,6 +111,11 @@ public:
             if (differs(x, from, c)) at(after_, c) = at(x, c);
         }
         return stops_ || mode_ != mode || !same_state(after_, before);
+    }
+
+    static void tell_direction(const SystemAt<X>& system, Crossing direction)
+    {
+        if (system->tell_direction) system->tell_direction(system.door(), direction);
     }
 
     [[nodiscard]] X& after() noexcept { return after_; }

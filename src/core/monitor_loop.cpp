@@ -30,6 +30,14 @@ void throw_state_moved(std::size_t component, double expected, double found)
         component, found, expected));
 }
 
+void throw_held_moved(std::size_t component, double expected, double found)
+{
+    throw OutOfTurn(fmt::format(
+        "EventMonitor: found a step with x1[{}] = {:.17g}; expected {:.17g}, since a rest holds "
+        "this component, see `held`",
+        component, found, expected));
+}
+
 void throw_beyond_time_event(double event, double end)
 {
     throw OutOfTurn(fmt::format(

@@ -19,6 +19,8 @@ namespace ricochet::detail {
 [[noreturn]] void throw_gap(double expected, double found);
 /// @throws std::logic_error because a step does not start at the state at the end of the last.
 [[noreturn]] void throw_state_moved(std::size_t component, double expected, double found);
+/// @throws std::logic_error because a component that a rest holds moves in a step.
+[[noreturn]] void throw_held_moved(std::size_t component, double expected, double found);
 /// @throws std::logic_error because the step goes beyond a time event.
 [[noreturn]] void throw_beyond_time_event(double event, double end);
 /// @throws std::logic_error because guards have to be examined before that time.
@@ -69,7 +71,8 @@ public:
         options_.t_start = t.value;
         options_.mode = mode;
         this->refuse_bad_modes();
-        started_ = ended_ = resting_ = this->stops_ = false;
+        started_ = ended_ = this->stops_ = false;
+        this->forget_holds();
         run_.outcome = Outcome::reached_end;
         this->forget_cause();
         this->pending_ = Pending::nothing;
@@ -130,15 +133,7 @@ public:
         }
         const bool due = timed_ && !lies_before(t, time_event_);
         if (due && t != time_event_) throw_beyond_time_event(time_event_, t);
-        step_.hold(t);
-        if (!due) return Verdict::rests;
-        return or_start_anew([&] {
-            cut_.s = 0;
-            this->begin_instant();
-            step_.refresh();
-            this->apply_time_event();
-            return show_set();
-        });
+        return or_start_anew([&] { return hold_until(t, due); });
     }
 
     [[nodiscard]] const Cut<X>& cut() const noexcept override { return cut_; }
@@ -146,6 +141,10 @@ public:
     [[nodiscard]] const X& x() const noexcept override { return step_.x0(); }
     [[nodiscard]] Mode mode() const noexcept override { return step_.mode(); }
     [[nodiscard]] double must_stop_at() const noexcept override { return time_event_; }
+    [[nodiscard]] std::span<const std::size_t> held() const noexcept override
+    {
+        return step_.held();
+    }
     [[nodiscard]] double quiet_until() const noexcept override
     {
         if (!guarded_) return backward_ ? -Engine::infinity : Engine::infinity;
@@ -210,6 +209,7 @@ public:
             started_ = had_started;
             throw;
         }
+        this->resume_holds();
         step_.restart(place_);
         this->watching_ = this->due_here_ = false;
         this->listed_at_ = Engine::stale;
@@ -279,6 +279,9 @@ private:
         for (std::size_t i = 0; i < x.size(); ++i) {
             if (!(x[i] == step.x0[i])) throw_state_moved(i, x[i], step.x0[i]);
         }
+        for (const std::size_t i : step_.held()) {
+            if (!(x[i] == step.x1[i])) throw_held_moved(i, x[i], step.x1[i]);
+        }
     }
 
     [[nodiscard]] bool ends_at_time_event(const HostStepTable& step) const
@@ -307,7 +310,8 @@ private:
         try {
             return function();
         } catch (...) {
-            started_ = resting_ = false;
+            started_ = false;
+            this->forget_holds();
             this->pending_ = Pending::nothing;
             step_.restart(step_.start(), step_.x0(), step_.mode());
             throw;
@@ -316,10 +320,58 @@ private:
 
     [[nodiscard]] Verdict check_at(const HostStepTable& step)
     {
+        show(step);
+        if (!this->holds_.empty()) return check_held(step);
+        return check_shown(step);
+    }
+
+    void show(const HostStepTable& step)
+    {
         step_.show(step);
         if (std::exchange(departs_, false)) step_.align_start();
         h_next_ = step.h;
         this->begin_instant();
+    }
+
+    /// The same for a step in which components are held: no farther than to where they go free.
+    [[nodiscard]] Verdict check_held(const HostStepTable& step)
+    {
+        const auto release = this->first_release(step.h, [this, &step](double s, X& x) {
+            if (s == step.h) return assign(x, step_.x1());
+            s == 0 ? assign(x, step_.x0()) : step_.interpolate(s, x);
+        });
+        const bool released = release.hold != no_guard && (release.at < step.h || !time_event_due_);
+        if (!released) {
+            const std::size_t left = this->guard_left_at(step_.time(step.h), step_.x1());
+            if (left != no_guard) {
+                this->end(Outcome::zeno, left);
+                step_.restart(step_.start(), step_.x0(), step_.mode());
+                return Verdict::ended;
+            }
+            return check_shown(step);
+        }
+        X end = step_.x0(), rate = end;
+        HostStepTable part = step;
+        if (release.at < step.h) {
+            step_.restep(release.at, end);
+            step_.flow(release.at, end, rate);
+            part.h = release.at;
+            part.x1 = end.data();
+            part.rate1 = rate.data();
+            part.is_cubic = false;
+            time_event_due_ = false;
+            departs_ = step_.is_aligned();
+            show(part);
+        }
+        const Verdict verdict = check_shown(part);
+        if (verdict != Verdict::stands) return verdict;
+        cut_.s = part.h;
+        this->release_here(release.hold);
+        return show_set();
+    }
+
+    [[nodiscard]] Verdict check_shown(const HostStepTable& step)
+    {
         if (holds_set()) {
             cut_.s = search_.at();
             this->cut_short();
@@ -342,7 +394,9 @@ private:
     /// Whether a set of events cuts the step short. False, too, if the run has ended.
     [[nodiscard]] bool holds_set()
     {
-        if (defers_ && !planner_->steps_aside()) return holds_set_by_plan();
+        // Bounds are those of the flow, and not of what a rest leaves of it.
+        const bool plans = defers_ && this->holds_.empty() && !planner_->steps_aside();
+        if (plans) return holds_set_by_plan();
         if (defers_) this->watch_all();
         bool cleared = false;
         return this->deserves_search(cleared) && finds(cleared);
@@ -384,6 +438,33 @@ private:
 
     [[nodiscard]] double clock(double t) const noexcept { return backward_ ? -t : t; }
 
+    // --- rests ---
+
+    [[nodiscard]] Verdict hold_until(double t, bool due)
+    {
+        cut_.s = 0;
+        const double length = step_.until(t);
+        const auto kept = [this](double, X& x) { assign(x, step_.x0()); };
+        const auto release = this->first_release(length, kept);
+        if (release.hold != no_guard && (release.at < length || !due)) {
+            step_.hold(release.at < length ? step_.time(release.at) : t);
+            this->begin_instant();
+            this->release_here(release.hold);
+            return show_set();
+        }
+        const std::size_t left = this->guard_left_at(t, step_.x0());
+        if (left != no_guard) {
+            this->end(Outcome::zeno, left);
+            return Verdict::ended;
+        }
+        step_.hold(t);
+        if (!due) return Verdict::rests;
+        this->begin_instant();
+        step_.refresh();
+        this->apply_time_event();
+        return show_set();
+    }
+
     // --- sets ---
 
     void place_rate(const double* dxdt)
@@ -401,8 +482,10 @@ private:
         cut_.mode_before = step_.mode();
         if (!this->settle()) {
             if (ended_) return Verdict::ended;
-            if (defers_ && !resting_ && !planner_->steps_aside()) this->begin_plan();
-            return resting_ ? Verdict::rests : Verdict::stands;
+            if (resting_) return Verdict::rests;
+            const bool plans = defers_ && this->holds_.empty() && !planner_->steps_aside();
+            if (plans) this->begin_plan();
+            return Verdict::stands;
         }
         cut_.s = 0;
         return show_set();
@@ -412,15 +495,20 @@ private:
     {
         if (this->pending_ == Pending::nothing) return Verdict::ended;
         cut_.t = step_.start();
-        cut_.accumulation = this->pending_ != Pending::settle;
-        if (!cut_.accumulation) {
+        const bool released = this->pending_ == Pending::arm_released;
+        cut_.accumulation = this->pending_ != Pending::settle && !released;
+        if (released) {
+            assign(cut_.before, step_.x0());
+            cut_.mode_before = step_.mode();
+        } else if (!cut_.accumulation) {
             assign(cut_.before, search_.before());
             cut_.mode_before = this->mode_before_;
         }
         assign(cut_.after, step_.x0());
         cut_.mode_after = step_.mode();
-        cut_.on_time = !cut_.accumulation && this->on_time_;
-        cut_.state_changed = !same_state(cut_.before, cut_.after);
+        cut_.on_time = !cut_.accumulation && !released && this->on_time_;
+        // The rates of a motion that goes free are not those of the state that was kept.
+        cut_.state_changed = released || !same_state(cut_.before, cut_.after);
         cut_.fired.assign(search_.fired().begin(), search_.fired().end());
         std::sort(cut_.fired.begin(), cut_.fired.end());
         return Verdict::cut;
@@ -452,6 +540,7 @@ private:
         require(h_next_ > 0 && std::isfinite(h_next_), "the scale");
         const std::size_t modes = this->modes();
         require(modes == 0 || place_.mode < modes, "the mode");
+        require(this->holds_fit(place_.x.size()), "what a rest holds");
     }
 
     template <class Visitor>
@@ -464,7 +553,7 @@ private:
         for (X* x : {&place_.x, &place_.remainder, &place_.rate}) visit.state(*x);
         visit(h_next_);
         visit(time_event_);
-        visit(resting_);
+        this->visit_holds(visit);
         visit(departs_);
         visit(ended_);
         visit(run_.outcome);

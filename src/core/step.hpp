@@ -10,9 +10,11 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
+#include "core/held_flow.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/detail/instant.hpp"
@@ -35,7 +37,9 @@ public:
     /// Places the step at the start of a run from x and evaluates the flow there. Where time runs
     /// backward, offsets and rates are counted backward as well.
     Step(const SystemAt<X>& system, const StepKernel<X>& kernel, const X& x, const Options& options)
-        : system_(system),
+        : free_(system),
+          system_(system),
+          own_kernel_(&kernel),
           kernel_(&kernel),
           state_(x),
           kept_rate_(state_.zero),
@@ -335,6 +339,40 @@ public:
         return alike;
     }
 
+    // --- components that stand still ---
+
+    /// Lets `components` stand still from the start of the step on, where their rates become zero.
+    /// The steps are then those of the library's kernel that calls flows by pointer. None: the flow
+    /// is the system's again, and is not evaluated.
+    void hold_components(std::span<const std::size_t> components)
+    {
+        const bool any = !components.empty();
+        held_.system = free_.operator->();
+        held_.door = free_.door();
+        held_.components.assign(components.begin(), components.end());
+        system_ = any ? SystemAt<X>(HeldFlow<X>::table, &held_, free_.span()) : free_;
+        state_.flow = system_->flow;
+        const StepKernel<X>* const before = kernel_;
+        kernel_ = any ? &kernel_by_pointer(*own_kernel_, state_.x0.size()) : own_kernel_;
+        if (kernel_ != before && kernel_->renew) kernel_->renew(free_.door());
+        held_.stop(state_.rate0);
+    }
+    [[nodiscard]] std::span<const std::size_t> held() const noexcept
+    {
+        return {held_.components.data(), held_.components.size()};
+    }
+    /// Whether a host takes the steps.
+    [[nodiscard]] bool is_of_host() const noexcept { return !own_kernel_->take; }
+
+    /// x' = f(t, x) of the system, in which nothing is held.
+    void free_flow(double t, const X& x, X& dxdt) const
+    {
+        ++state_.flow_calls;
+        state_.flow_fits &=
+            free_->flow(free_.door(), state_.mode, state_.flow_at(inside(t)), x, dxdt);
+        if (state_.backward) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
+    }
+
     // --- time events, at which the flow may jump ---
 
     /// Has the flow of the step that was taken seen a jump at its end, the time event at t? From
@@ -415,6 +453,8 @@ public:
             of.rate1[i] = host.rate1[i];
         }
     }
+
+    [[nodiscard]] bool is_aligned() const noexcept { return aligned_; }
 
     /// An interpolant need not begin at the start state to the last bit, and one that is
     /// evaluated at times is a staircase for offsets shorter than the time resolves. Either could
@@ -788,8 +828,11 @@ private:
         });
     }
 
-    SystemAt<X> system_;
+    SystemAt<X> free_;    ///< the system
+    SystemAt<X> system_;  ///< the same, or the flow in which components are held
+    const StepKernel<X>* own_kernel_;
     const StepKernel<X>* kernel_;
+    HeldFlow<X> held_;
     mutable StepState<X> state_;
     std::vector<double> component_atol_;
     double atol_ = 0;

@@ -236,6 +236,7 @@ int main(void)
     IS(RC_TOUCH);
     IS(RC_TIME);
     IS(RC_ACCUMULATION);
+    IS(RC_MODE);
     IS(RC_JUMP);
     SIZE(rc_verdict);
     IS(RC_NO_VERDICT);

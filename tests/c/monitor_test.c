@@ -172,6 +172,86 @@ static void comes_to_rest_and_is_held_until_a_time_event(void)
     CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
 }
 
+/* --- a rest that holds a part of a state that moves --- */
+
+/* x, y and their rates; x is the time, and y is lifted from 1 s on. */
+static int slide(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+{
+    rc_monitor** const monitor = user;
+    size_t count = 0, i;
+    const size_t* held;
+    (void)mode, (void)t, (void)n;
+    dxdt[0] = x[2];
+    dxdt[1] = x[3];
+    dxdt[2] = 0;
+    dxdt[3] = -10 + (x[0] > 1 ? 10 * (x[0] - 1) : 0);
+    /* As a host computes it. The monitor calls it, too, to see what lifts the ball: it asks with
+     * the bare flow, since no monitor is set then. */
+    if (!*monitor) return 0;
+    held = rc_monitor_held(*monitor, &count);
+    for (i = 0; i < count; ++i) dxdt[held[i]] = 0;
+    return 0;
+}
+static int over_floor(void* user, size_t which, rc_mode mode, double t, const double* x, size_t n,
+                      double* g)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)n;
+    *g = x[1];
+    return 0;
+}
+static int bounce_off(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)n;
+    x[1] = 0;
+    x[3] *= -0.5;
+    return 0;
+}
+static int lie_there(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)n;
+    x[1] = x[3] = 0;
+    return 0;
+}
+
+static void keeps_what_a_rest_holds_while_the_rest_moves(void)
+{
+    static const double thrown[4] = {0, 0.1, 1, 0};
+    rc_monitor *none = NULL, *monitor;
+    rc_callbacks callbacks, of_host;
+    struct host host;
+    struct met met = {0};
+    size_t count = 7;
+    rc_event event;
+    memset(&callbacks, 0, sizeof callbacks);
+    callbacks.size = sizeof callbacks;
+    callbacks.dimension = 4;
+    callbacks.guard_count = 1;
+    callbacks.user = &none;
+    callbacks.flow = slide;
+    callbacks.guard = over_floor;
+    callbacks.reset = bounce_off;
+    callbacks.rest = lie_there;
+    monitor = monitor_of(&callbacks, NULL);
+    of_host = callbacks;
+    of_host.user = &monitor;
+    CHECK(rc_monitor_held(monitor, &count) == NULL && count == 0);
+    CHECK(host_start(&host, monitor, &of_host, 0, thrown, 0.1) == RC_STANDS);
+    CHECK(host_run(&host, monitor, RC_STANDS, 1.5, 0.1, &met) == RC_STANDS);
+    /* The flights end at sqrt(2 0.1 / 10) (1 + e) / (1 - e), with e = 0.5. */
+    CHECK(met.accumulation[met.cuts - 1] && fabs(met.t[met.cuts - 1] - 3 * sqrt(0.02)) < 1e-12);
+    CHECK(rc_monitor_held(monitor, &count)[0] == 1 && rc_monitor_held(monitor, NULL)[1] == 3);
+    CHECK(count == 2 && host.x[1] == 0 && fabs(host.x[0] - 1.5) < 1e-12);
+    /* It hangs free at 2 s; then y = 5/3 (t - 2)^3, which steps of rk4 follow exactly. */
+    CHECK(host_run(&host, monitor, RC_STANDS, 3, 0.1, &met) == RC_STANDS);
+    CHECK(met.fired[met.cuts - 1] == 0 && fabs(met.t[met.cuts - 1] - 2) < 1e-12);
+    CHECK(rc_monitor_held(monitor, &count) == NULL && count == 0);
+    CHECK(fabs(host.x[0] - 3) < 1e-12 && fabs(host.x[1] - 5.0 / 3) < 1e-11);
+    event.size = sizeof event;
+    CHECK_STATUS(RC_OK, rc_monitor_event_at(monitor, rc_monitor_event_count(monitor) - 1, &event));
+    CHECK(event.kind == RC_MODE && event.guard == 0);
+    CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+}
+
 /* --- modes, recorded events, hosts with resets of their own --- */
 
 static int heat(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
@@ -862,6 +942,7 @@ int main(void)
     finds_the_impacts_of_a_ball();
     finds_simultaneous_impacts_in_sets();
     comes_to_rest_and_is_held_until_a_time_event();
+    keeps_what_a_rest_holds_while_the_rest_moves();
     switches_between_modes();
     lets_a_host_make_the_state_itself();
     asks_the_flow_where_a_host_gives_no_rate();

@@ -123,6 +123,8 @@ static inline rc_verdict host_run(struct host* host, rc_monitor* monitor, rc_ver
             met->mode[met->cuts++] = cut.mode_after;
             host_restart(host, cut.t, cut.after, cut.mode_after);
             CHECK_STATUS(RC_OK, rc_monitor_resume(monitor, host->rate, n, h, &verdict));
+            /* What a rest holds stands still from here on. */
+            if (rc_monitor_held(monitor, NULL)) host_flow(host, host->x, host->rate);
         }
         if (verdict == RC_RESTS && rc_monitor_must_stop_at(monitor) <= t_end) {
             const double until = rc_monitor_must_stop_at(monitor);

@@ -481,6 +481,72 @@ struct OldMode {
     }
 };
 
+// --- the direction of a crossing ---
+
+/// Counts the turns of sin t: up and down, in a mode each or without.
+struct Turns {
+    using State = std::array<double, 2>;
+    Crossing crossing = Crossing::either;
+    void flow(double, const State&, State& dxdt) const { dxdt = {0, 0}; }
+    [[nodiscard]] double guard(double t, const State&) const { return std::sin(t); }
+    void reset(Crossing direction, double, State& x) const
+    {
+        x[direction == Crossing::rising ? 1 : 0] += 1;
+    }
+};
+struct ModedTurns {
+    using State = Turns::State;
+    static constexpr std::size_t guard_count = 1, mode_count = 2;
+    Crossing crossing = Crossing::either;
+    void flow(Mode, double, const State&, State& dxdt) const { dxdt = {0, 0}; }
+    [[nodiscard]] double guard(std::size_t, Mode, double t, const State&) const
+    {
+        return std::sin(t);
+    }
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.crossing = crossing}; }
+    Mode reset(std::size_t, Crossing direction, Mode, double t, State& x) const
+    {
+        Turns{}.reset(direction, t, x);
+        return direction == Crossing::rising ? 1 : 0;
+    }
+};
+
+/// Two guards that cross together, one up and one down.
+struct Both {
+    using State = Turns::State;
+    static constexpr std::size_t guard_count = 2;
+    void flow(double, const State&, State& dxdt) const { dxdt = {1, 0}; }
+    [[nodiscard]] double guard(std::size_t which, double, const State& x) const
+    {
+        return which == 0 ? x[0] - 1 : 1 - x[0];
+    }
+    void reset(std::size_t which, Crossing direction, double, State& x) const
+    {
+        x[1] += (which == 0 ? 1 : 10) * (direction == Crossing::rising ? 1 : 2);
+    }
+    [[nodiscard]] GuardInfo guard_info(std::size_t) const { return {.crossing = Crossing::either}; }
+};
+
+TEST(Instants, AResetIsToldTheDirectionOfItsCrossing)
+{
+    // From 0.5 to 20 the sine falls at pi, 3 pi, 5 pi, and rises at 2 pi, 4 pi, 6 pi.
+    const Options options{.t_start = 0.5, .t_end = 20, .h_max = 0.5};
+    by_methods(Turns{}, Turns::State{}, options, 0.21, [](const auto& run, const char* label) {
+        EXPECT_EQ(run.x, (Turns::State{3, 3})) << label;
+    });
+    by_methods(ModedTurns{}, Turns::State{}, options, 0.21, [](const auto& run, const char* label) {
+        EXPECT_EQ(run.x, (Turns::State{3, 3})) << label;
+        EXPECT_EQ(run.mode, 1U) << label;
+    });
+    const Turns down{Crossing::falling};
+    by_methods(down, Turns::State{}, options, 0.21, [](const auto& run, const char* label) {
+        EXPECT_EQ(run.x, (Turns::State{3, 0})) << label;
+    });
+    // Each is told its own direction.
+    by_methods(Both{}, Turns::State{}, {.t_end = 2}, 0.21,
+               [](const auto& run, const char* label) { EXPECT_EQ(run.x[1], 21) << label; });
+}
+
 TEST(Instants, TheFlowOfAModeThatWasLeftIsNotCalledAfterItsReset)
 {
     for (const bool records : {false, true}) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -486,6 +487,80 @@ TEST(Monitor, AMotionAtRestIsHeldUntilATimeEvent)
     EXPECT_EQ(rests, 3u);
     EXPECT_EQ(run.verdict, Verdict::rests);
     EXPECT_EQ(run.x, (X{0, 0}));
+}
+
+/// A ball that is thrown sideways, (x, y) and their rates, and lifted by `lift` [m/s³] from 1 s on.
+/// At 1 m/s x is the time, so that a host need not know it.
+struct Sideways {
+    double lift = 0;
+    void flow(double t, const X4& x, X4& dxdt) const
+    {
+        const double since = (x[2] == 1 ? x[0] : t) - 1;
+        dxdt = {x[2], x[3], 0, -10 + lift * std::max(since, 0.0)};
+    }
+    [[nodiscard]] double guard(double, const X4& x) const { return x[1]; }
+    void reset(double, X4& x) const { x[1] = 0, x[3] *= -0.5; }
+    void rest(double, X4& x) const { x[1] = x[3] = 0; }
+};
+
+/// The motion of a host that keeps the components that the monitor names.
+template <class System, class Monitor>
+struct Keeping {
+    const System* system;
+    const Monitor* monitor;
+    void flow(double t, const X4& x, X4& dxdt) const
+    {
+        system->flow(t, x, dxdt);
+        for (const std::size_t c : monitor->held()) dxdt[c] = 0;
+    }
+};
+
+TEST(Monitor, AThrownBallSlidesOnInAHostThatKeepsWhatRests)
+{
+    const Sideways ball;
+    EventMonitor monitor(ball, X4{});
+    const Keeping host{&ball, &monitor};
+    const auto run = drive(host, monitor, X4{0, 0.1, 1, 0}, 4, 0.1);
+    EXPECT_EQ(run.verdict, Verdict::stands);
+    ASSERT_TRUE(run.cuts.back().accumulation);
+    EXPECT_NEAR(run.cuts.back().t.value, 3 * std::sqrt(0.02), 1e-12);  // sqrt(2 h / g) 1.5 / 0.5
+    EXPECT_NEAR(run.x[0], 4, 1e-12);
+    EXPECT_EQ(run.x[1], 0);
+    EXPECT_TRUE(std::ranges::equal(monitor.held(), std::array{1U, 3U}));
+    // A host that lets them move is told so, and may go on.
+    EventMonitor other(ball, X4{});
+    EXPECT_THROW((void)drive(ball, other, X4{0, 0.1, 1, 0}, 4, 0.1), std::logic_error);
+    EXPECT_EQ(other.outcome(), Outcome::reached_end);
+}
+
+TEST(Monitor, WhatTheFlowLiftsGoesFree)
+{
+    // The weight is -10 + 10 (t - 1) from 1 s on: free at 2 s, then y = 5/3 (t - 2)^3, which is
+    // exact in steps of rk4. Once the ball slides, once it lies still.
+    for (const double speed : {1.0, 0.0}) {
+        const Sideways ball{10};
+        EventMonitor monitor(ball, X4{});
+        const Keeping host{&ball, &monitor};
+        auto run = drive(host, monitor, X4{0, 0.1, speed, 0}, 3, 0.1);
+        if (speed == 0) {
+            ASSERT_EQ(run.verdict, Verdict::rests);
+            ASSERT_EQ(monitor.hold(3), Verdict::cut);
+            EXPECT_NEAR(monitor.cut().t.value, 2, 1e-12);
+            EXPECT_TRUE(monitor.cut().fired.empty());
+            EXPECT_EQ(monitor.resume(0.1), Verdict::stands);
+            EXPECT_TRUE(monitor.held().empty());
+            continue;
+        }
+        EXPECT_EQ(run.verdict, Verdict::stands);
+        ASSERT_GT(run.cuts.size(), 2U);
+        const auto& freed = run.cuts.back();
+        EXPECT_NEAR(freed.t.value, 2, 1e-12);
+        EXPECT_TRUE(freed.fired.empty());
+        EXPECT_FALSE(freed.accumulation || freed.on_time);
+        EXPECT_EQ(run.events.back().kind, EventKind::mode);
+        EXPECT_NEAR(run.x[0], 3, 1e-12);
+        EXPECT_NEAR(run.x[1], 5.0 / 3, 1e-11);
+    }
 }
 
 /// A ball on a floor whose height is only known at finite times.

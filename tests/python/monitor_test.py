@@ -111,6 +111,36 @@ def test_a_ball_comes_to_rest_and_is_held():
         monitor.examine(10.0, 0.1, [0, 0], [0, 0], [0, 0], [0, 0])
 
 
+def test_a_host_keeps_what_a_rest_holds_while_the_rest_moves():
+    # x, y and their rates; y is lifted from 1 s on, and hangs free at 2 s.
+    def free(t, x):
+        return np.array([x[2], x[3], 0.0, -10.0 + (10.0 * (t - 1.0) if t > 1 else 0.0)])
+
+    def kept(t, x):
+        rate = free(t, x)
+        rate[monitor.held] = 0.0
+        return rate
+
+    system = ricochet.System(free, [ricochet.Guard(
+        lambda t, x: x[1], reset=lambda t, x: [x[0], 0.0, x[2], -0.5 * x[3]],
+        rest=lambda t, x: [x[0], 0.0, x[2], 0.0], name="floor")])
+    monitor = Monitor(system, [0.0] * 4)
+    assert monitor.held == []
+    cuts = []
+    assert drive(monitor, kept, 0.0, np.array([0.0, 0.1, 1.0, 0.0]), 1.5, cuts=cuts) is Verdict.STANDS
+    assert cuts[-1].accumulation and monitor.held == [1, 3]
+    # sqrt(2 0.1 / 10) (1 + e) / (1 - e), with e = 0.5
+    assert cuts[-1].t == pytest.approx(3 * math.sqrt(0.02), abs=1e-12)
+    assert monitor.x[0] == pytest.approx(1.5, abs=1e-12) and monitor.x[1] == 0
+
+    monitor = Monitor(system, [0.0] * 4)
+    assert drive(monitor, kept, 0.0, np.array([0.0, 0.1, 1.0, 0.0]), 3.0, cuts=cuts) is Verdict.STANDS
+    assert cuts[-1].t == pytest.approx(2.0, abs=1e-12) and cuts[-1].fired == []
+    assert monitor.held == [] and monitor.events["kind"][-1] == Kind.MODE
+    # y = 5/3 (t - 2)^3, which steps of rk4 follow exactly
+    assert monitor.x[:2] == pytest.approx([3.0, 5 / 3], abs=1e-11)
+
+
 def test_time_events_and_modes_by_name():
     system = ricochet.System(
         lambda mode, t, x: [1.0 if mode == "up" else -1.0],

@@ -686,6 +686,38 @@ TEST(SensitivityThroughEvents, ABallThatDoesNotBounceRestsWhereverItFell)
     EXPECT_EQ(s.state, Eigen::MatrixXd::Zero(2, 2));
 }
 
+/// x, y and their rates; y comes to rest on the floor, and x does not.
+struct ThrownBall {
+    using State = std::array<double, 4>;
+    template <class V>
+    void flow(const V&, const std::array<V, 4>& x, std::array<V, 4>& dxdt) const
+    {
+        dxdt[0] = x[2];
+        dxdt[1] = x[3];
+        dxdt[2] = V(0);
+        dxdt[3] = V(-10);
+    }
+    template <class V>
+    [[nodiscard]] V guard(const V&, const std::array<V, 4>& x) const
+    {
+        return x[1];
+    }
+    void reset(double, State& x) const { x[1] = 0, x[3] *= -0.5; }
+    void rest(double, State& x) const { x[1] = x[3] = 0; }
+};
+
+TEST(SensitivityThroughEvents, AThrownBallThatRestsSlidesOn)
+{
+    // x = x0 + u t, whatever the flights are; y and its rate are those of the floor.
+    const auto s = sensitivities(ThrownBall{}, {0, 0.1, 1, 0}, {}, {.t_end = 4, .rtol = 1e-12});
+    ASSERT_EQ(s.run.outcome, Outcome::reached_end);
+    EXPECT_FALSE(s.undefined_at);
+    Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(4, 4);
+    expected(0, 0) = expected(2, 2) = 1;
+    expected(0, 2) = 4;
+    EXPECT_LE((s.state - expected).cwiseAbs().maxCoeff(), 1e-9) << s.state;
+}
+
 // --- a reset that changes the dimension ---
 
 /// x' = 1 up to x = 1, then (x, v) with x' = -x, v' = x, from v = 1 + t.

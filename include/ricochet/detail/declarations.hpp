@@ -351,6 +351,13 @@ template <class System, class X>
         return Declaration::absent;
     } else if constexpr (!Resetting<System, X>) {
         return unfit<Name_reset, System, X>();
+    } else if constexpr (DirectedReset<System, X>) {
+        constexpr bool copies =
+            Name_reset::takes<const System, Crossing, double, X> ||
+            Name_reset::takes<const System, std::size_t, Crossing, double, X> ||
+            Name_reset::takes<const System, Crossing, Mode, double, X> ||
+            Name_reset::takes<const System, std::size_t, Crossing, Mode, double, X>;
+        return copies ? Declaration::by_value : Declaration::fits;
     } else if constexpr ((PlainSingleReset<System, X> &&
                           Name_reset::takes<const System, double, X>) ||
                          (PlainResetOf<System, X> &&
@@ -641,7 +648,7 @@ constexpr bool check_declarations()
                    "void reset([std::size_t which,] double t, State& x) const, or Mode "
                    "reset([std::size_t which,] Mode, double t, State& x) const, "
                    "or with const FiredGuards& for `which`; `which` if and only if there is a "
-                   "guard_count; and a guard")
+                   "guard_count; and a guard; the direction of the crossing may follow `which`")
     RICOCHET_CHECK(rest,
                    "void rest([std::size_t which,] double t, State& x) const, or Mode "
                    "rest([std::size_t which,] Mode, double t, State& x) const, "

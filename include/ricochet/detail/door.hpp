@@ -99,6 +99,10 @@ public:
 
     [[nodiscard]] const System& system() const noexcept { return *system_; }
 
+    /// Direction in which the guard has crossed whose reset comes next.
+    [[nodiscard]] Crossing direction() const noexcept { return direction_; }
+    void tell_direction(Crossing direction) noexcept { direction_ = direction; }
+
     /// Converts a state of the loop to one of the system's.
     [[nodiscard]] const X& read(const Core& x, [[maybe_unused]] std::size_t room)
     {
@@ -151,6 +155,7 @@ public:
 private:
     struct None {};
     const System* system_;
+    Crossing direction_ = Crossing::falling;
     [[no_unique_address]] std::conditional_t<copied, std::array<X, 3>, None> scratch_{};
 };
 
@@ -221,8 +226,9 @@ class TableOf {
 
     static Mode reset(void* door, std::size_t which, Mode mode, double t, C& x)
     {
-        return at(door).edit(
-            x, [&](X& state) { return call_reset(system(door), which, mode, t, state); });
+        return at(door).edit(x, [&](X& state) {
+            return call_reset(system(door), which, at(door).direction(), mode, t, state);
+        });
     }
     static Mode reset_set(void* door, const FiredGuards& fired, Mode mode, double t, C& x)
     {
@@ -279,6 +285,11 @@ class TableOf {
             table.reset_set = &reset_set;
         } else if constexpr (Resetting<System, X>) {
             table.reset = &reset;
+            if constexpr (DirectedReset<System, X>) {
+                table.tell_direction = [](void* door, Crossing direction) {
+                    at(door).tell_direction(direction);
+                };
+            }
         }
         if constexpr (Resting<System, X>) table.rest = &rest;
     }

@@ -66,6 +66,7 @@ public:
     [[nodiscard]] virtual const X& x() const noexcept = 0;
     [[nodiscard]] virtual Mode mode() const noexcept = 0;
     [[nodiscard]] virtual double must_stop_at() const noexcept = 0;
+    [[nodiscard]] virtual std::span<const std::size_t> held() const noexcept = 0;
     [[nodiscard]] virtual double quiet_until() const noexcept = 0;
     virtual void skip_to(const Instant& t, const X& x, const double* dxdt) = 0;
     [[nodiscard]] virtual Side side(std::size_t guard) const = 0;

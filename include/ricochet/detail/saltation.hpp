@@ -112,17 +112,53 @@ public:
         return time;
     }
 
-    /// Takes the motion through a reset at an event that moves by dt; `held`: the motion
-    /// stands still from there on.
+    /// The components that the rest of guard `which` holds: those whose result depends neither on
+    /// the state nor on the time, if the flow at the state `after` it presses on the guard.
+    [[nodiscard]] std::vector<bool> held_by_rest(std::size_t which, const Motion<X>& motion,
+                                                 const X& after) const
+    {
+        std::vector<bool> held(static_cast<std::size_t>(after.size()), false);
+        const GuardInfo info = guard_info_of<X>(system(), which);
+        const double inward = info.crossing == Crossing::rising ? -1 : 1;
+        // A rate that is zero has the sign that it has a little later.
+        const double ahead = 1e-6 * std::max(1.0, std::fabs(motion.t));
+        X later = after;
+        move(later, after, ahead, linearization_.flow(motion.mode, motion.t, after));
+        const double rate = linearization_.guard_rate(
+            which, motion.mode, motion.t, later, linearization_.flow(motion.mode, motion.t, later));
+        if (!(inward * rate < 0)) return held;
+        held.assign(held.size(), true);
+        const auto strike_out = [&](double dt, const X& s) {
+            const X by = linearization_.reset_along(
+                RestOf{which}, {.mode = motion.mode, .t = motion.t, .dt = dt, .x = motion.x}, s);
+            std::size_t c = 0;
+            for_each_component(by, [&](auto i) { held[c] = held[c] && by[i] == 0, ++c; });
+        };
+        X unit = zeros_shaped_like(motion.x);
+        strike_out(1, unit);
+        for_each_component(motion.x, [&](auto i) {
+            unit[i] = 1;
+            strike_out(0, unit);
+            unit[i] = 0;
+        });
+        return held;
+    }
+
+    /// Takes the motion through a reset at an event that moves by dt; components that are `held`
+    /// stand still from there on.
     template <class Reset>
     void pass(const Reset& reset, const Eigen::VectorXd& dt, Motion<X>& motion,
-              bool held = false) const
+              const std::vector<bool>& held = {}) const
     {
         const Motion<X> before = motion;
         const X f_before = linearization_.flow(before.mode, before.t, before.x);
         motion.mode = reset.apply(system(), before.mode, before.t, motion.x);
-        const X f_after = held ? zeros_shaped_like(motion.x)
-                               : linearization_.flow(motion.mode, motion.t, motion.x);
+        X f_after = linearization_.flow(motion.mode, motion.t, motion.x);
+        std::size_t c = 0;
+        for_each_component(f_after, [&](auto i) {
+            if (c < held.size() && held[c]) f_after[i] = 0;
+            ++c;
+        });
         motion.derivatives.resize(index(motion.x.size()), index(columns()));
         for (std::size_t j = 0; j < columns(); ++j) {
             const double moved = dt[index(j)];

@@ -80,6 +80,9 @@ struct SystemTable {
     bool (*enabled_in)(Door, std::size_t which, Mode) = nullptr;
     bool (*enabled_at)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
     Mode (*reset)(Door, std::size_t which, Mode, double t, X& x) = nullptr;
+    /// Called before `reset`: the direction in which the guard has crossed. Null where resets do
+    /// not ask for it.
+    void (*tell_direction)(Door, Crossing) = nullptr;
     Mode (*reset_set)(Door, const FiredGuards&, Mode, double t, X& x) = nullptr;
     Mode (*rest)(Door, std::size_t which, Mode, double t, X& x) = nullptr;
 

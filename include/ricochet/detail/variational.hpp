@@ -70,8 +70,6 @@ class Variational
     static constexpr std::size_t fixed_guards =
         Guarded<System, X> ? fixed_guard_count<System, X>() : 0;
     static constexpr std::size_t fixed = detail::fixed_size<X>();
-    // A system of one guard and no modes stands still once it rests.
-    static constexpr bool held_at_rest = fixed_guards == 1 && !Moded<System, X>;
     static constexpr double nan = std::numeric_limits<double>::quiet_NaN();
     static constexpr double never = -std::numeric_limits<double>::max();
 
@@ -296,7 +294,9 @@ public:
             const detail::EventTime time = last.any ? detail::EventTime{Undefined::no, last.dt}
                                                     : saltation_.crossing(which, motion, last);
             if (time.undefined != Undefined::no) return time.undefined;
-            saltation_.pass(detail::RestOf{which}, time.dt, motion, held_at_rest);
+            std::vector<bool> held;
+            if (next == mode) held = saltation_.held_by_rest(which, motion, after);
+            saltation_.pass(detail::RestOf{which}, time.dt, motion, held);
             last = {t, time.dt, true, t};
             return motion.derivatives.allFinite() ? Undefined::no : Undefined::non_finite;
         });

@@ -107,7 +107,8 @@ enum class EventKind : std::uint8_t {
     touch,         ///< the guard reached its surface and turned back
     time,          ///< a time event
     accumulation,  ///< the limit of infinitely many events
-    mode,          ///< a reaction went from one of its bounds to the other
+    mode,          ///< a reaction went from one of its bounds to the other; of a guard: what its
+                   ///< rest held has gone free
     stick,         ///< a reaction at a bound began to hold
     slip,          ///< a reaction that held met a bound
     jump,          ///< the guard changed sign without a zero: it jumped, or has a pole there

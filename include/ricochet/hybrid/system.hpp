@@ -21,6 +21,8 @@
 //                               std::span<double>, or both
 //     guard_rate(which, t, x, dxdt)    or guard_rates(t, x, dxdt, rates)
 //     reset(which, t, x)        or reset(fired, t, x) for all that fired together
+//                               (any reset of one guard may take the direction of the crossing
+//                               before t or the mode: Crossing::falling or Crossing::rising)
 //     rest(which, t, x)
 //     guard_info(which)         GuardInfo: name, crossing, whether it resets, ...
 //     enabled(which, t, x)      whether a crossing here and now is an event
@@ -250,7 +252,31 @@ concept PlainSingleReset = !CountsGuards<System> && requires(const System& syste
 };
 
 template <class System, class X>
-concept ResetsAlone = ModedResetOf<System, X> || PlainResetOf<System, X> || ModedSingleReset<System, X> || PlainSingleReset<System, X>;
+concept ModedDirectedResetOf = CountsGuards<System> && requires(const System& system, std::size_t which, Crossing direction, Mode mode, double t, X& x) {
+    { system.reset(which, direction, mode, t, x) } -> std::convertible_to<Mode>;
+};
+
+template <class System, class X>
+concept PlainDirectedResetOf = CountsGuards<System> && requires(const System& system, std::size_t which, Crossing direction, double t, X& x) {
+    system.reset(which, direction, t, x);
+};
+
+template <class System, class X>
+concept ModedDirectedReset = !CountsGuards<System> && requires(const System& system, Crossing direction, Mode mode, double t, X& x) {
+    { system.reset(direction, mode, t, x) } -> std::convertible_to<Mode>;
+};
+
+template <class System, class X>
+concept PlainDirectedReset = !CountsGuards<System> && requires(const System& system, Crossing direction, double t, X& x) {
+    system.reset(direction, t, x);
+};
+
+/// The reset asks in which direction the guard has crossed.
+template <class System, class X>
+concept DirectedReset = ModedDirectedResetOf<System, X> || PlainDirectedResetOf<System, X> || ModedDirectedReset<System, X> || PlainDirectedReset<System, X>;
+
+template <class System, class X>
+concept ResetsAlone = DirectedReset<System, X> || ModedResetOf<System, X> || PlainResetOf<System, X> || ModedSingleReset<System, X> || PlainSingleReset<System, X>;
 
 template <class System, class X>
 concept ResetsTogether = ModedSetReset<System, X> || PlainSetReset<System, X>;
@@ -528,11 +554,21 @@ inline void call_rates(const System& system, const Along<X>& at, std::span<doubl
     }
 }
 
-/// Applies the reset of one guard; returns the mode after it.
+/// Applies the reset of one guard, which has crossed in a direction; returns the mode after it.
 template <class System, class X>
-[[nodiscard]] Mode call_reset(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Mode mode, double t, X& x)
+[[nodiscard]] Mode call_reset(const System& system, [[maybe_unused]] std::size_t which, [[maybe_unused]] Crossing direction, [[maybe_unused]] Mode mode, double t, X& x)
 {
-    if constexpr (ModedResetOf<System, X>) {
+    if constexpr (ModedDirectedResetOf<System, X>) {
+        return system.reset(which, direction, mode, t, x);
+    } else if constexpr (PlainDirectedResetOf<System, X>) {
+        system.reset(which, direction, t, x);
+        return mode;
+    } else if constexpr (ModedDirectedReset<System, X>) {
+        return system.reset(direction, mode, t, x);
+    } else if constexpr (PlainDirectedReset<System, X>) {
+        system.reset(direction, t, x);
+        return mode;
+    } else if constexpr (ModedResetOf<System, X>) {
         return system.reset(which, mode, t, x);
     } else if constexpr (PlainResetOf<System, X>) {
         system.reset(which, t, x);
@@ -543,6 +579,15 @@ template <class System, class X>
         system.reset(t, x);
         return mode;
     }
+}
+
+/// The same where the direction is not known.
+template <class System, class X>
+[[nodiscard]] Mode call_reset(const System& system, std::size_t which, Mode mode, double t, X& x)
+{
+    static_assert(!DirectedReset<System, X>,
+                  "ricochet: found a reset that takes the direction of a crossing, where it is not known; expected a reset without it");
+    return call_reset(system, which, Crossing::falling, mode, t, x);
 }
 
 /// Applies the reset of all guards that fired; returns the mode after it.

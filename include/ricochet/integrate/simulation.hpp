@@ -297,6 +297,10 @@ template <class X>
 ///         x⁻, q    = x⁺, q⁺
 ///     x        = x⁻
 ///
+/// (after a rest in the same mode, if the flow presses on the guard: the components of x that
+/// `rest` sets without regard to x stand still until the flow lifts the guard, or an event changes
+/// one of them or the mode)
+///
 /// (the run ends where F, q and x⁻ repeat, or a guard fires for the thousandth time at t)
 ///
 /// so that steps are half-open, (t, t + h]: a zero at the end of a step belongs to it, a zero at

@@ -49,10 +49,11 @@ public:
     double must_stop_at() const override { return monitor_.must_stop_at(); }
 
 private:
-    [[nodiscard]] static StepVerdict verdict(Verdict given) noexcept
+    [[nodiscard]] StepVerdict verdict(Verdict given) const noexcept
     {
         switch (given) {
-            case Verdict::stands: return StepVerdict::stands;
+            case Verdict::stands:
+                return monitor_.held().empty() ? StepVerdict::stands : StepVerdict::rests;
             case Verdict::cut: return StepVerdict::cut;
             case Verdict::rests: return StepVerdict::rests;
             case Verdict::ended: break;

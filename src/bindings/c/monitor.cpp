@@ -232,6 +232,16 @@ rc_mode rc_monitor_mode(rc_monitor* monitor)
                     [](const auto& engine) { return engine.mode(); });
 }
 
+const size_t* rc_monitor_held(rc_monitor* monitor, size_t* count)
+{
+    if (count) *count = 0;
+    return place_of<const size_t*>(monitor, nullptr, [&](const auto& engine) -> const size_t* {
+        const auto held = engine.held();
+        if (count) *count = held.size();
+        return held.empty() ? nullptr : held.data();
+    });
+}
+
 double rc_monitor_must_stop_at(rc_monitor* monitor)
 {
     return place_of(monitor, not_a_time, [](const auto& engine) { return engine.must_stop_at(); });

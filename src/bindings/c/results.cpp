@@ -14,6 +14,7 @@
 namespace ricochet::c {
 
 static_assert(static_cast<int>(EventKind::accumulation) == RC_ACCUMULATION &&
+              static_cast<int>(EventKind::mode) == RC_MODE &&
               static_cast<int>(EventKind::jump) == RC_JUMP);
 static_assert(no_guard == RC_NO_GUARD && time_event_reset == RC_TIME_EVENT_RESET);
 

@@ -123,7 +123,11 @@ public:
         } else if (any(&CallbackGuard::reset)) {
             table.reset = [](void* door, std::size_t which, Mode mode, double t, State& x) {
                 const CallbackGuard& guard = at(door).source_.guards_[which];
+                if (guard.directed) return at(door).reset_by_direction(guard, mode, t, x);
                 return at(door).edit(guard.reset, "reset of ", guard.owner, mode, t, x);
+            };
+            table.tell_direction = [](void* door, Crossing direction) {
+                at(door).direction_ = direction;
             };
         }
         if (any(&CallbackGuard::rest)) {
@@ -354,6 +358,13 @@ private:
         return take_result(result.get(), what, of, mode, x);
     }
 
+    [[nodiscard]] Mode reset_by_direction(const CallbackGuard& guard, Mode mode, double t, State& x)
+    {
+        const Ref direction = checked(PyLong_FromLong(direction_ == Crossing::rising ? 1 : -1));
+        const Ref result = call_reset(guard.reset, mode, t, x_.show(x), direction.get());
+        return take_result(result.get(), "reset of ", guard.owner, mode, x);
+    }
+
     [[nodiscard]] static bool is_stop(PyObject* object)
     {
         const Ref& known = stop_class();
@@ -477,6 +488,7 @@ private:
     }
 
     const CallbackSource& source_;
+    Crossing direction_ = Crossing::falling;  ///< of the guard whose reset comes next
     ShownArray x_, dxdt_;
     State there_;
     std::vector<double> values_;

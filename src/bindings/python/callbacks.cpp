@@ -175,6 +175,10 @@ void CallbackSource::read_guard(PyObject* specification)
     guard.lower_bound = function("lower_bound");
     guard.upper_bound = function("upper_bound");
     guard.lipschitz = number_in(specification, "lipschitz", 1);
+    guard.directed = truth_in(specification, "directed");
+    if (guard.directed && (!guard.reset || guard.reset.address)) {
+        raise(PyExc_ValueError, guard.title + ": found directed, expected a reset in Python");
+    }
     if (!guard.value && !guard_values_) {
         raise(PyExc_TypeError, guard.title + ": found None, expected a function");
     }

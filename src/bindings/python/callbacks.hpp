@@ -55,6 +55,7 @@ struct CallbackGuard {
     Function value, rate, reset, rest, enabled;
     Function speed_bound, acceleration_bound, lower_bound, upper_bound;
     double lipschitz = 1;
+    bool directed = false;      ///< the reset takes the direction of the crossing
     std::vector<bool> in_mode;  ///< empty: in every mode
 };
 

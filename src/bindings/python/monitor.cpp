@@ -248,6 +248,11 @@ public:
         const Turn turn = take_turn();
         return names_.mode_named(monitor_->mode());
     }
+    [[nodiscard]] std::vector<std::size_t> held()
+    {
+        const Turn turn = take_turn();
+        return {monitor_->held().begin(), monitor_->held().end()};
+    }
     [[nodiscard]] double must_stop_at()
     {
         const Turn turn = take_turn();
@@ -397,6 +402,9 @@ void bind_monitor(py::module_& module)
         .def_property_readonly("t", &PyMonitor::t, "Where the next step begins.")
         .def_property_readonly("x", &PyMonitor::x, "The state there, which may be kept.")
         .def_property_readonly("mode", &PyMonitor::mode, "The mode there.")
+        .def_property_readonly("held", &PyMonitor::held,
+                               "The components that a rest holds, as a list of numbers: the host "
+                               "keeps them constant in its next steps, while the others flow.")
         .def_property_readonly("must_stop_at", &PyMonitor::must_stop_at,
                                "The next time event, beyond which no step goes; infinite where "
                                "there is none.")

@@ -10,6 +10,7 @@
 //     go_on_from(t, x, changed)
 //                          goes to time t in its last step, or after it, with the state x;
 //                          `changed`: its motion so far does not lead to x, or the mode is new
+//     keep(components)     optional: keeps these components of its state constant, and no others
 #pragma once
 
 #include <algorithm>
@@ -26,6 +27,7 @@ namespace ricochet::hosts {
 /// before the host continues from it.
 /// @return `stands` at t_end, `rests` there, or `ended`; `monitor.outcome()` says why
 /// @throws std::invalid_argument if t_end is not finite, or lies before the time of the host
+/// @throws std::logic_error if a rest holds a part of a moving state, and the host has no `keep`
 template <class Host, class Monitor, class AtCut>
 Verdict run(Host& host, Monitor& monitor, double t_end, const AtCut& at_cut, Mode mode = 0)
 {
@@ -40,6 +42,14 @@ Verdict run(Host& host, Monitor& monitor, double t_end, const AtCut& at_cut, Mod
                           ? monitor.resume(host.rate(), host.scale())
                           : monitor.resume(host.x(), cut.mode_after, host.rate(), host.scale());
         }
+        if constexpr (requires { host.keep(monitor.held()); }) {
+            host.keep(monitor.held());
+        } else if (verdict == Verdict::stands && !monitor.held().empty()) {
+            throw std::logic_error(
+                "hosts::run: found a rest that holds component " +
+                std::to_string(monitor.held().front()) +
+                " of a state that moves; expected a host that can keep it, or a rest with a mode");
+        }
         return verdict;
     };
     // Nearer to t_end than this a method cannot take a step.
@@ -53,8 +63,8 @@ Verdict run(Host& host, Monitor& monitor, double t_end, const AtCut& at_cut, Mod
     while (verdict != Verdict::ended && t_end - host.t() > rounding) {
         const double stop = std::min(t_end, monitor.must_stop_at());
         if (verdict == Verdict::rests) {
-            verdict = monitor.hold(stop);
-            host.go_on_from(stop, host.x(), true);
+            verdict = monitor.hold(stop);  // where the flow lifts the motion, less far
+            host.go_on_from(monitor.t().value, host.x(), true);
             verdict = settled(verdict);
         } else {
             host.step(stop);

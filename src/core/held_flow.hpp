@@ -1,0 +1,65 @@
+// A flow in which some components stand still, and the kernels that can follow it.
+#pragma once
+
+#include <array>
+#include <boost/container/small_vector.hpp>
+#include <cstddef>
+
+#include "core/named_kernels.hpp"
+#include "ricochet/detail/kernels.hpp"
+#include "ricochet/detail/system_table.hpp"
+
+namespace ricochet::detail {
+
+/// The flow of a system with some of its components at zero; its own door.
+template <class X>
+struct HeldFlow {
+    const SystemTable<X>* system = nullptr;
+    void* door = nullptr;
+    boost::container::small_vector<std::size_t, 8> components{};
+
+    /// Sets the rates of the components to zero.
+    void stop(X& dxdt) const noexcept
+    {
+        for (const std::size_t c : components) {
+            if (c < dxdt.size()) dxdt[c] = 0;
+        }
+    }
+    static bool flow(void* door, Mode mode, double t, const X& x, X& dxdt)
+    {
+        const HeldFlow& held = *static_cast<const HeldFlow*>(door);
+        const bool fits = held.system->flow(held.door, mode, t, x, dxdt);
+        held.stop(dxdt);
+        return fits;
+    }
+    [[nodiscard]] static constexpr SystemTable<X> make_table() noexcept
+    {
+        SystemTable<X> table;
+        table.flow = &flow;
+        return table;
+    }
+    static const SystemTable<X> table;
+};
+
+template <class X>
+inline constexpr SystemTable<X> HeldFlow<X>::table = HeldFlow<X>::make_table();
+
+/// The library's kernel of the same method that calls the flow by pointer. Of a method that is none
+/// of the library's: that of its orders, else Dormand and Prince's, or for fixed steps rk4. A
+/// host's steps stay its own.
+template <class X>
+[[nodiscard]] const StepKernel<X>& kernel_by_pointer(const StepKernel<X>& kernel, std::size_t size)
+{
+    if (!kernel.take || named_kernel(&kernel)) return kernel;
+    for (const MethodName name : {MethodName::euler, MethodName::rk4, MethodName::cash_karp54,
+                                  MethodName::dopri5, MethodName::fehlberg78}) {
+        const StepKernel<X>& named = kernel_by_name<X>(name, size);
+        if (named.order == kernel.order && named.error_order == kernel.error_order &&
+            named.interpolates() == kernel.interpolates()) {
+            return named;
+        }
+    }
+    return kernel_by_name<X>(kernel.error_order > 0 ? MethodName::dopri5 : MethodName::rk4, size);
+}
+
+}  // namespace ricochet::detail

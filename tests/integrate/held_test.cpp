@@ -1,0 +1,393 @@
+// What a rest holds, and when it goes free.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <vector>
+
+#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/locate/locators.hpp"
+#include "ricochet/rosenbrock.hpp"
+#include "ricochet/taylor.hpp"
+
+namespace ricochet::held_test {
+namespace {
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+/// Times of the events of a kind.
+template <class Run>
+[[nodiscard]] std::vector<double> times_of(const Run& run, EventKind kind)
+{
+    std::vector<double> times;
+    for (const auto& event : run.events) {
+        if (event.kind == kind) times.push_back(event.t);
+    }
+    return times;
+}
+
+void expect_near(const std::vector<double>& found, const std::vector<double>& expected,
+                 double tolerance)
+{
+    ASSERT_EQ(found.size(), expected.size());
+    for (std::size_t i = 0; i < found.size(); ++i) EXPECT_NEAR(found[i], expected[i], tolerance);
+}
+
+// --- a ball that is thrown sideways ---
+
+/// x, y and their rates, above a floor at `floor`; g = 10 m/s², e = 0.5.
+struct Thrown {
+    using State = std::array<double, 4>;
+    double floor = 0;
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[2], x[3], 0, -10}; }
+    [[nodiscard]] double guard(double, const State& x) const { return x[1] - floor; }
+    void reset(double, State& x) const { x[1] = floor, x[3] *= -0.5; }
+    void rest(double, State& x) const { x[1] = floor, x[3] = 0; }
+};
+
+/// The same with a second guard, which records where x = 2.
+struct Recorded : Thrown {
+    static constexpr std::size_t guard_count = 2;
+    [[nodiscard]] double guard(std::size_t which, double t, const State& x) const
+    {
+        return which == 0 ? Thrown::guard(t, x) : x[0] - 2;
+    }
+    void reset(std::size_t, double t, State& x) const { Thrown::reset(t, x); }
+    void rest(std::size_t, double t, State& x) const { Thrown::rest(t, x); }
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        if (which == 0) return {};
+        return {.crossing = Crossing::rising, .resets = false};
+    }
+};
+
+/// From the height 0.1 at 1 m/s: the flights end at sqrt(2 0.1 / 10) (1 + e) / (1 - e), with a
+/// remainder below 16 units in the last place; x is t, linear in time and exact by any method.
+template <class System, class Stepping = ErrorControlled<Dopri5>>
+auto expect_slide(const System& system, const Stepping& stepping = {}, double step = 0)
+{
+    const auto run =
+        integrate(system, {0, 0.1, 1, 0}, {.t_end = 4, .step = step, .rtol = 1e-10}, stepping);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    expect_near(times_of(run, EventKind::accumulation), {3 * std::sqrt(0.02)}, 1e-12);
+    EXPECT_NEAR(run.x[0], 4, 1e-12);
+    EXPECT_EQ(run.x[1], 0);
+    EXPECT_EQ(run.x[2], 1);
+    EXPECT_EQ(run.x[3], 0);
+    return run;
+}
+
+TEST(Held, AThrownBallSlidesOn)
+{
+    expect_slide(Thrown{});
+    expect_slide(Thrown{}, ErrorControlled<Fehlberg78>{});
+    expect_slide(Thrown{}, ErrorControlled<CashKarp54>{});
+    expect_slide(Thrown{}, FixedStep<Rk4>{}, 0.01);
+}
+
+/// The same, for methods that read the formulas of the flow.
+struct Formulas : Thrown {
+    template <class S>
+    constexpr void flow(const S&, const std::array<S, 4>& x, std::array<S, 4>& dxdt) const
+    {
+        dxdt[0] = x[2];
+        dxdt[1] = x[3];
+        dxdt[2] = 0.0 * x[2];
+        dxdt[3] = 0.0 * x[3] - 10.0;
+    }
+    template <class V>
+    [[nodiscard]] auto guard(const auto&, const V& x) const
+    {
+        return x[1];
+    }
+};
+
+TEST(Held, ByMethodsThatAreReplacedMeanwhile)
+{
+    expect_slide(Formulas{}, ErrorControlled<Taylor>{});
+    expect_slide(Formulas{}, FixedStep<Taylor>{}, 0.01);
+    expect_slide(Formulas{}, ErrorControlled<Rosenbrock4>{});
+}
+
+TEST(Held, AnotherGuardChangesNothing)
+{
+    const auto run = expect_slide(Recorded{});
+    ASSERT_EQ(run.events.back().guard, 1U);
+    EXPECT_NEAR(run.events.back().t, 2, 1e-12);
+}
+
+TEST(Held, ASlideOnAFloorThatHasARounding)
+{
+    // The limit is known to its `error` alone; x keeps the time.
+    for (const double floor : {1.0, -3.7, 1000.0}) {
+        const auto run = integrate(Thrown{floor}, {0, floor + 0.1, 1, 0}, {.t_end = 4});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << floor;
+        const auto& last = run.events.back();
+        ASSERT_EQ(last.kind, EventKind::accumulation) << floor;
+        EXPECT_NEAR(last.t, 3 * std::sqrt(0.02), last.error) << floor;
+        EXPECT_NEAR(run.x[0], 4, 1e-12) << floor;
+        EXPECT_EQ(run.x[1], floor);
+    }
+}
+
+TEST(Held, SamplesAndTheSolutionFollowTheSlide)
+{
+    const std::vector<double> times = {0.43, 1, 2.5, 3.9, 4};
+    const auto run = integrate(Thrown{}, {0, 0.1, 1, 0},
+                               {.t_end = 4, .record_steps = true, .sample_times = times});
+    ASSERT_EQ(run.trajectory.t, times);
+    for (std::size_t i = 0; i < times.size(); ++i) {
+        EXPECT_NEAR(run.trajectory.x[i][0], times[i], 1e-12);
+        EXPECT_EQ(run.trajectory.x[i][1], 0);
+        EXPECT_NEAR(run.solution(times[i])[0], times[i], 1e-12);
+    }
+}
+
+TEST(Held, ASavedSlideGoesOnWithTheSameBits)
+{
+    Simulation simulation(Recorded{}, {0, 0.1, 1, 0}, {.t_end = 4});
+    while (simulation.t() < 0.5) ASSERT_TRUE(simulation.step());
+    const Snapshot snapshot = simulation.save();
+    const auto whole = simulation.take();
+    Simulation other(Recorded{}, {0, 0.1, 1, 0}, {.t_end = 4});
+    other.restore(snapshot);
+    const auto rest = other.take();
+    EXPECT_EQ(rest.x, whole.x);
+    EXPECT_NEAR(whole.x[0], 4, 1e-12);
+    EXPECT_EQ(rest.statistics.events, 1U);
+}
+
+// --- what goes free ---
+
+/// A ball that is pulled by `pull(t)`; the floor has e = 0.5, and throws it up by `launch` where
+/// its flights end. At the time `tick` it gets the speed `kick`.
+struct Pulled {
+    using State = std::array<double, 2>;
+    std::function<double(double)> pull = [](double) { return -10.0; };
+    double launch = 0;
+    double tick = infinity;
+    double kick = 0;
+    void flow(double t, const State& x, State& dxdt) const { dxdt = {x[1], pull(t)}; }
+    [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
+    void reset(double, State& x) const { x = {0, -0.5 * x[1]}; }
+    void rest(double, State& x) const { x = {0, launch}; }
+    [[nodiscard]] double next_time_event(double t) const { return t < tick ? tick : infinity; }
+    void time_reset(double, State& x) const { x[1] += kick; }
+};
+
+TEST(Held, ARestThatThrowsTheBallUpHoldsNothing)
+{
+    // It flies for 1 s, and again and again by half; two seconds from limit to limit.
+    const auto run = integrate(Pulled{.launch = 5}, {0.2, 0}, {.t_end = 10, .rtol = 1e-10});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    expect_near(times_of(run, EventKind::accumulation), {0.6, 2.6, 4.6, 6.6, 8.6}, 1e-12);
+    EXPECT_NEAR(run.x[0], 0.2, 1e-11);
+    EXPECT_NEAR(run.x[1], -1.5, 1e-11);
+}
+
+TEST(Held, AKickSetsTheBallFree)
+{
+    const Pulled kicked{.tick = 2, .kick = 1};
+    const auto run = integrate(kicked, {0.2, 0}, {.t_end = 5, .sample_times = {2.1}});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    expect_near(times_of(run, EventKind::accumulation), {0.6, 2.4}, 1e-12);
+    EXPECT_NEAR(run.trajectory.x.at(0)[0], 0.05, 1e-12);
+    EXPECT_EQ(run.x, (Pulled::State{0, 0}));
+    EXPECT_TRUE(times_of(run, EventKind::mode).empty());
+}
+
+TEST(Held, ALiftSetsTheBallFree)
+{
+    // From 1 s on the weight is lifted by 10 N/s per kg: at 2 s it hangs free, then
+    // v = 5 (t - 2)^2 and x = 5/3 (t - 2)^3.
+    const auto lift = [](double t) { return t < 1 ? -10 : -10 + 10 * (t - 1); };
+    for (const double tick : {1.0, infinity}) {
+        const auto run =
+            integrate(Pulled{.pull = lift, .tick = tick}, {0.2, 0}, {.t_end = 3, .rtol = 1e-10});
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        expect_near(times_of(run, EventKind::accumulation), {0.6}, 1e-12);
+        expect_near(times_of(run, EventKind::mode), {2}, 1e-12);
+        EXPECT_NEAR(run.x[0], 5.0 / 3, 1e-9);
+        EXPECT_NEAR(run.x[1], 5, 1e-9);
+    }
+}
+
+TEST(Held, ALiftOfAShortTimeIsSeenInALongRun)
+{
+    /// It lies on its floor from the start.
+    struct Lying : Pulled {
+        bool unilateral = true;
+    };
+    // Lifted each time that 12 sin t exceeds the weight; at rest again before the next.
+    Lying ball;
+    ball.pull = [](double t) { return -10 + 12 * std::sin(t); };
+    const auto run = integrate(ball, {0, 0}, {.t_end = 100, .rtol = 1e-9});
+    const auto freed = times_of(run, EventKind::mode);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(freed.size(), 16U);  // once a turn, the last at 15 turns + asin(10 / 12)
+    const double pi = std::acos(-1);
+    for (std::size_t k = 0; k < freed.size(); ++k) {
+        EXPECT_NEAR(freed[k], std::asin(10.0 / 12) + 2 * pi * static_cast<double>(k), 1e-9);
+    }
+}
+
+/// At x = 2 the floor ends.
+struct Ledge : Thrown {
+    static constexpr std::size_t guard_count = 2, mode_count = 2;
+    void flow(Mode, double t, const State& x, State& dxdt) const { Thrown::flow(t, x, dxdt); }
+    [[nodiscard]] double guard(std::size_t which, Mode, double t, const State& x) const
+    {
+        return which == 0 ? Thrown::guard(t, x) : 2 - x[0];
+    }
+    [[nodiscard]] bool enabled(std::size_t, Mode mode) const { return mode == 0; }
+    Mode reset(std::size_t which, Mode, double t, State& x) const
+    {
+        if (which == 0) Thrown::reset(t, x);
+        return which == 0 ? 0 : 1;
+    }
+    Mode rest(std::size_t, Mode mode, double t, State& x) const
+    {
+        Thrown::rest(t, x);
+        return mode;
+    }
+};
+
+TEST(Held, AChangeOfModeSetsTheBallFree)
+{
+    const auto run = integrate(Ledge{}, {0, 0.1, 1, 0}, {.t_end = 3, .rtol = 1e-10});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_NEAR(run.x[0], 3, 1e-12);
+    EXPECT_NEAR(run.x[1], -5, 1e-11);  // a second of free fall
+    EXPECT_NEAR(run.x[3], -10, 1e-11);
+}
+
+/// Two balls on a floor; at 2 s something throws the first up at 1 m/s.
+struct Two {
+    using State = std::array<double, 4>;  // y0, v0, y1, v1
+    static constexpr std::size_t guard_count = 3;
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -10, x[3], -10}; }
+    [[nodiscard]] double guard(std::size_t which, double t, const State& x) const
+    {
+        return which < 2 ? x[2 * which] : 2 - t;
+    }
+    void reset(std::size_t which, double, State& x) const
+    {
+        if (which == 2) x[1] += 1;
+        if (which < 2) x[2 * which] = 0, x[2 * which + 1] *= -0.5;
+    }
+    void rest(std::size_t which, double, State& x) const { x[2 * which] = x[2 * which + 1] = 0; }
+};
+
+TEST(Held, OneBallOfTwoIsHeldAndThenStruck)
+{
+    // Limits at sqrt(2 h / g) (1 + e) / (1 - e): 0.6 and 3 s; the second flights of ball 0 end
+    // after 2 v / g (1 + e + ...) = 0.4 s.
+    const auto run = integrate(Two{}, {0.2, 0, 5, 0}, {.t_end = 4, .rtol = 1e-10});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    expect_near(times_of(run, EventKind::accumulation), {0.6, 2.4, 3}, 1e-12);
+    EXPECT_EQ(run.x, (Two::State{0, 0, 0, 0}));
+}
+
+// --- what cannot be held ---
+
+TEST(Held, WhatCannotBeHeldEndsTheRun)
+{
+    /// The floor moves.
+    struct Moving : Pulled {
+        double speed = 0.1, bend = 0;
+        [[nodiscard]] double at(double t) const { return speed * t + bend * t * t / 2; }
+        [[nodiscard]] double guard(double t, const State& x) const { return x[0] - at(t); }
+        void reset(double t, State& x) const
+        {
+            const double v = speed + bend * t;
+            x = {at(t), v - 0.5 * (x[1] - v)};
+        }
+        void rest(double t, State& x) const { x = {at(t), speed + bend * t}; }
+    };
+    /// A slope: `rest` projects the state onto it, and every result depends on the state.
+    struct Sloped : Thrown {
+        double slope = 0.1;
+        [[nodiscard]] double guard(double, const State& x) const { return x[1] - slope * x[0]; }
+        void reset(double, State& x) const
+        {
+            const double own = (x[3] - slope * x[2]) / (1 + slope * slope);
+            x[1] = slope * x[0];
+            x[2] += 1.5 * own * slope;
+            x[3] -= 1.5 * own;
+        }
+        void rest(double, State& x) const
+        {
+            const double along = (x[2] + slope * x[3]) / (1 + slope * slope);
+            x = {x[0], slope * x[0], along, slope * along};
+        }
+    };
+    for (const double bend : {0.0, 0.1, -0.1}) {
+        Moving moving;
+        moving.bend = bend;
+        const auto run = integrate(moving, {0.2, 0}, {.t_end = 10});
+        EXPECT_EQ(run.outcome, Outcome::zeno) << bend;
+        EXPECT_LT(run.t, 1) << bend;
+        EXPECT_EQ(run.guard, 0U);
+    }
+    const auto run = integrate(Sloped{}, {0, 0.1, 1, 0}, {.t_end = 4});
+    EXPECT_EQ(run.outcome, Outcome::zeno);
+    EXPECT_LT(run.t, 1);
+}
+
+TEST(Held, ASurfaceThatLeavesLaterEndsTheRunThere)
+{
+    /// The floor sinks from 5 s on.
+    struct Sinking : Pulled {
+        [[nodiscard]] double guard(double t, const State& x) const
+        {
+            return x[0] + (t > 5 ? std::pow(t - 5, 3) : 0);
+        }
+    };
+    const auto run = integrate(Sinking{}, {0.2, 0}, {.t_end = 10, .h_max = 0.1});
+    EXPECT_EQ(run.outcome, Outcome::zeno);
+    EXPECT_NEAR(run.t, 5, 0.1);  // the step in which it is seen
+}
+
+// --- cost ---
+
+/// Counts its calls.
+struct Counted : Pulled {
+    std::uint64_t* rests;
+    std::uint64_t* flows;
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        ++*flows;
+        Pulled::flow(t, x, dxdt);
+    }
+    void rest(double t, State& x) const
+    {
+        ++*rests;
+        Pulled::rest(t, x);
+    }
+};
+
+TEST(Held, ABallAtRestTakesNoSteps)
+{
+    std::uint64_t rests = 0, flows = 0;
+    const auto run = integrate(Counted{{}, &rests, &flows}, {0.2, 0}, {.t_end = 1e7});
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_EQ(run.t, 1e7);
+    EXPECT_EQ(run.x, (Pulled::State{0, 0}));
+    EXPECT_LT(run.statistics.steps, 300U);
+    EXPECT_EQ(rests, 5U);  // the rest, two displacements of the state and two times
+}
+
+TEST(Held, WhereNothingPressesNothingIsAsked)
+{
+    std::uint64_t rests = 0, flows = 0;
+    const Counted thrown{{.launch = 5}, &rests, &flows};
+    const auto run = integrate(thrown, {0.2, 0}, {.t_end = 10});
+    EXPECT_EQ(rests, times_of(run, EventKind::accumulation).size());
+}
+
+}  // namespace
+}  // namespace ricochet::held_test
