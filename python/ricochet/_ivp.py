@@ -341,6 +341,10 @@ def _result(run, count, dense_output, events_given):
     message = _MESSAGES.get(run.outcome, run.message)
     if events_given:
         message = _OWN_MESSAGES.get(run.outcome, message)
+        if run.other_guard is not None:  # of a cycle that accumulates, or of two resets
+            names = [f"events[{k}]" if name == str(k) else name
+                     for k, name in enumerate(run.guard_names)]
+            message += f": {names[run.guard]}, {names[run.other_guard]}"
     result.update(nfev=statistics.flow_calls, njev=0, nlu=0,
                   status={"reached_end": 0, "stopped_by_event": 1}.get(run.outcome, -1),
                   message=message, success=run.success)

@@ -460,10 +460,10 @@ protected:
     /// bounds may be expensive, and the distance is then taken from its location.
     void find_band(std::size_t i, double t);
 
-    /// Value |g| at the state before, where the guard has fired.
-    [[nodiscard]] double tolerance_of(std::size_t i, double t)
+    /// Value |g| at the set, at time t, before its resets.
+    [[nodiscard]] double value_at_set(std::size_t i, double t)
     {
-        return std::fabs(bank_.view(i, mode_before_, calls()).value(t, search_.before()));
+        return std::fabs(bank_.view(i, step_.mode(), calls()).value(t, search_.before()));
     }
 
     [[nodiscard]] double time_of_set() const noexcept { return set_time_; }
@@ -531,8 +531,22 @@ protected:
     /// Whether the fired guards prolong a row of events with excursions that are lost in rounding,
     /// by which a cycle of guards accumulates.
     [[nodiscard]] bool prolongs_row();
+    /// The same for guards that fire at the instant of the set before, where rounding hides that
+    /// they would have moved away from their surfaces and back.
+    [[nodiscard]] bool prolongs_row_at_once();
     /// Records the excursion of guard i that has just ended, `soon` after the last acting instant.
     [[nodiscard]] bool falls(std::size_t i, bool soon);
+    [[nodiscard]] bool has_excursions(std::size_t i) const noexcept
+    {
+        const GuardInfo& info = std::as_const(bank_)[i].info;
+        return !info.boolean && resets_any_ && info.resets;
+    }
+    /// Notes the slopes and roundings that `falls` needs.
+    void note_excursions();
+    /// Size of an excursion that ended at a rate of `slope` [1/s], `interval` [s] after the last
+    /// acting instant.
+    [[nodiscard]] double size_of_excursion(std::size_t i, double slope,
+                                           double interval) const noexcept;
 
     /// Uncertainty [s] of a limit that comes from the rounding of the guards of the cycle: those
     /// with an event in the last two rounds of that length [s].
@@ -787,9 +801,24 @@ protected:
 
     void note_crossings(double s);
 
+    /// Notes all that has to be known of the mode and the flow before the resets of the set, which
+    /// may leave them.
+    void note_set();
+    /// Keeps what `note_set` changes besides the guards of the set, and takes it back where the
+    /// resets have changed nothing.
+    void keep_suspects();
+    void put_suspects_back();
+    /// Notes the guards whose events a time event finds vetoed.
+    void note_vetoes();
+
     /// Records the crossings of other guards before the fired set that leave a guard on its other
     /// side, and the crossings that coincide with the set.
     void note_crossings_to_set();
+
+    /// Time [s] of an event found up to offset s.
+    [[nodiscard]] double time_of(const Note& note, double s) const noexcept;
+    /// Drops the touches up to offset s that `enabled` rejects.
+    void veto_touches(double s);
 
     [[nodiscard]] bool counts_at_set(std::size_t i);
     /// Whether a recorded guard has not left its side at the set, by no more than the rounding of
@@ -893,6 +922,12 @@ protected:
     /// a pair, right after each has been written by itself, would stall the processor.
     double set_time_ = 0;
     Mode mode_before_ = 0;
+    struct {
+        std::vector<typename GuardBank<X, single>::Kept> guards;
+        std::vector<Note> notes;
+        std::uint64_t disabled = 0, disabled_in_search = 0;
+        bool uses_space = false;  ///< of the search
+    } kept_;                      ///< see `keep_suspects`
     boost::container::small_vector<std::pair<std::size_t, double>, 8> left_alone_;
     bool changed_mode_ = false;  ///< by the resets of the current set
     bool enters_mode_ = false;   ///< by them, or by the rest after them

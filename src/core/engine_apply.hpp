@@ -8,16 +8,10 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline void EventEngine<X, single>::cut_short()
 {
-    const double s = search_.at();
-    const double t = on_time_ ? time_event_ : time_of_set();
-    bank_.forget_bands();
-    note_crossings_to_set();
-    if (on_time_) note_ties();
-    mode_before_ = step_.mode();
-    for (const std::size_t i : search_.fired()) find_band(i, t);
+    bank_.take_bands();
     ++run_.statistics.steps;
     count_refined();
-    record_notes(s);
+    record_notes(search_.at());
     apply(true, on_time_);
 }
 
@@ -86,16 +80,16 @@ inline void EventEngine<X, single>::find_band(std::size_t i, double t)
     record.jumped = where.jump;
     if (where.jump) {  // the state is beyond the jump, and the guard is not small there
         record.estimated = false;
-        record.band = 0;
+        record.noted.band = 0;
         return;
     }
     const double residue = system_->bounded ? 2 * std::fabs(where.slope) * where.error : infinity;
     record.estimated = std::isfinite(residue) && !record.info.boolean &&
                        search_.at() == where.root && !search_.late();
-    const double g = search_.value_at_set(i);
-    record.band = record.estimated ? std::max(residue, bank_.touch(i, step_.h()))
-                  : g == g         ? g
-                                   : tolerance_of(i, t);
+    const double known = search_.value_at_set(i);
+    record.noted.value = known == known ? known : value_at_set(i, t);
+    record.noted.band =
+        record.estimated ? std::max(residue, bank_.touch(i, step_.h())) : record.noted.value;
 }
 
 template <class X, bool single>
@@ -194,10 +188,11 @@ inline bool EventEngine<X, single>::timer_is_endless()
 template <class X, bool single>
 inline void EventEngine<X, single>::apply_time_event()
 {
-    bank_.forget_bands();
+    bank_.take_bands();
     search_.fired().clear();
     assign(search_.before(), step_.x0());
     leave_from_start();
+    note_vetoes();
     transform(true, false);
     note_left_alone(false);
     apply(false, true);

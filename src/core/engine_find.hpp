@@ -129,15 +129,18 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
         }
         place_set(step_.instant(search_.at(), search_.at_remainder()));
         before_resets();
+        note_set();
         transform(on_time_, true);
         if (on_time_ || !changes_nothing() ||
             (resets_any_ && (changed_elsewhere() || acts_beyond()))) {
             note_left_alone(true);
             return true;
         }
+        put_suspects_back();
         go_on_past_members();
     }
     note_crossings(step_.h());
+    veto_touches(step_.h());
     if (search_.notes().empty()) {
         if (asked_ && !cleared) ++run_.statistics.false_alarms;
         run_.statistics.evidence.add(search_.evidence());
@@ -214,6 +217,7 @@ bool EventEngine<X, single>::acts_beyond()
         return false;
     }
     X& x = resets_.scratch();
+    if (kept_.uses_space) search_.put_space_back();
     const double t = search_.go_beyond(step_, bank_, i, x, calls());
     if (t == t && resets_.ask_again(system_, i, step_.mode(), t, x, search_.before())) {
         --count;

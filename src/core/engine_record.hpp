@@ -16,6 +16,62 @@ inline void EventEngine<X, single>::note_crossings(double s)
 }
 
 template <class X, bool single>
+inline void EventEngine<X, single>::note_set()
+{
+    const double t = on_time_ ? time_event_ : time_of_set();
+    mode_before_ = step_.mode();
+    keep_suspects();
+    note_crossings_to_set();
+    if (on_time_) {
+        note_ties();
+        note_vetoes();
+    }
+    for (const std::size_t i : search_.fired()) find_band(i, t);
+    if (bank_.keeps_rows()) note_excursions();
+    veto_touches(search_.at());
+    if (search_.shows_polynomial() && records_states()) step_.prepare_polynomial();
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::keep_suspects()
+{
+    kept_.guards.clear();
+    for (const std::size_t i : bank_.suspects()) {
+        if (!is_member(i)) kept_.guards.push_back(bank_.keep(i));
+    }
+    kept_.notes = search_.notes();
+    kept_.disabled = run_.statistics.disabled;
+    kept_.disabled_in_search = search_.disabled;
+    kept_.uses_space = !kept_.guards.empty() || (system_->enabled_at && !kept_.notes.empty());
+    if (!kept_.uses_space) return;
+    search_.keep_lost(step_);
+    search_.keep_space();
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::put_suspects_back()
+{
+    for (const std::size_t i : search_.fired()) bank_[i].noted.band = 0;
+    for (const auto& guard : kept_.guards) bank_.put_back(guard);
+    search_.notes() = kept_.notes;
+    run_.statistics.disabled = kept_.disabled;
+    search_.disabled = kept_.disabled_in_search;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::note_vetoes()
+{
+    if (!system_->enabled_at) return;
+    const double t = time_event_;
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        const GuardRecord& record = std::as_const(bank_)[i];
+        if (!record.acting || !record.enabled || record.info.boolean) continue;
+        const bool vetoed = !system_.enabled_at(i, step_.mode(), t, search_.before());
+        if (vetoed != record.noted.vetoed) bank_[i].noted.vetoed = vetoed;
+    }
+}
+
+template <class X, bool single>
 inline void EventEngine<X, single>::note_crossings_to_set()
 {
     if (search_.fired().size() == bank_.size()) return;
@@ -30,7 +86,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         const double rounded = std::fabs(at.value) + std::fabs(at.rate) * ulp;
         // It has crossed with the set, to no effect: rounding does not take it back.
         if (record.from > 0 && at.s - record.from <= 8 * finest_bracket(at.s, step_.h())) {
-            if (!record.info.boolean) record.band = rounded;
+            if (!record.info.boolean) record.noted.band = rounded;
             continue;
         }
         const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays there
@@ -40,7 +96,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         GuardSample last = at;
         // Until it crosses, the guard is on the side that it comes from. The time of the set is
         // rounded to a double.
-        if (with_set) record.band = rounded;
+        if (with_set) record.noted.band = rounded;
         if (with_set) last.value = -std::copysign(std::numeric_limits<double>::min(), at.rate);
         if (!record.acting) {
             search_.note_crossings(step_, bank_, i, last, calls());
@@ -69,7 +125,7 @@ inline bool EventEngine<X, single>::is_rounding_at_set(std::size_t i, const Guar
     const double size = std::fabs(at.value);
     const double moves = std::fabs(at.rate) * std::fabs(step_.time(at.s));
     if (bank_[i].acting || has_left(bank_[i].side, at.value)) return false;
-    if (!(size <= 0x1p-20 * std::max(bank_.scale(i, step_.h()), moves))) return false;
+    if (!(size <= part_by_rounding * std::max(bank_.scale(i, step_.h()), moves))) return false;
     return size <= rounding_of(i, step_.mode(), step_.time(at.s), search_.before());
 }
 
@@ -176,20 +232,33 @@ inline void EventEngine<X, single>::assign_state_of(const Note& note, double s, 
 }
 
 template <class X, bool single>
+inline double EventEngine<X, single>::time_of(const Note& note, double s) const noexcept
+{
+    const double remainder = s == search_.at() ? search_.at_remainder() : 0;
+    const double latest = step_.instant(s, remainder).value;
+    const double t = step_.time(note.where.root);
+    return backward_ ? std::max(t, latest) : std::min(t, latest);
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::veto_touches(double s)
+{
+    if (!system_->enabled_at) return;
+    const auto vetoed = [&](const Note& note) {
+        if (note.kind != EventKind::touch || note.where.root > s) return false;
+        return !system_.enabled_at(note.guard, step_.mode(), time_of(note, s),
+                                   search_.state_at(step_, note));
+    };
+    run_.statistics.disabled += std::erase_if(search_.notes(), vetoed);
+}
+
+template <class X, bool single>
 inline void EventEngine<X, single>::record_notes(double s)
 {
     if (search_.notes().empty()) return;
     search_.keep_notes_until(s);
-    const double remainder = s == search_.at() ? search_.at_remainder() : 0;
-    const double latest = step_.instant(s, remainder).value;
     for (const Note& note : search_.notes()) {
-        const double t = backward_ ? std::max(step_.time(note.where.root), latest)
-                                   : std::min(step_.time(note.where.root), latest);
-        if (note.kind == EventKind::touch && system_->enabled_at &&
-            !system_.enabled_at(note.guard, step_.mode(), t, search_.state_at(step_, note))) {
-            ++run_.statistics.disabled;
-            continue;
-        }
+        const double t = time_of(note, s);
         count_event(note.guard, t, note.side);
         bank_[note.guard].returned = note.kind == EventKind::touch;
         if (!options_.record_events) continue;

@@ -35,7 +35,7 @@ inline bool EventEngine<X, single>::rest_fired()
 template <class X, bool single>
 bool EventEngine<X, single>::prolongs_row()
 {
-    if (!located_) return false;  // at the same instant as the set before
+    if (!located_) return prolongs_row_at_once();
     LostRow& row = bank_.row();
     const bool soon = row.follows_soon(step_.start());
     bool falls = soon && !on_time_ && !search_.fired().empty();
@@ -49,35 +49,75 @@ bool EventEngine<X, single>::prolongs_row()
 }
 
 template <class X, bool single>
+bool EventEngine<X, single>::prolongs_row_at_once()
+{
+    LostRow& row = bank_.row();
+    if (row.is_empty() || on_time_) return false;
+    for (const std::size_t i : search_.fired()) {
+        const Excursions& excursions = std::as_const(bank_)[i].excursions;
+        // A guard that a reset has carried across its surface has had no excursion to lose.
+        const bool stood = std::fabs(bank_.armed_value(i)) <= excursions.rounding();
+        const bool has_had_some = excursions.has_fallen() && std::isfinite(excursions.end());
+        if (!has_excursions(i) || !has_had_some || !stood) return false;
+    }
+    for (const std::size_t i : search_.fired()) {
+        bank_[i].excursions.vanish(step_.start().value);
+        row.add(bank_[i].excursions);
+    }
+    return !search_.fired().empty();
+}
+
+template <class X, bool single>
 bool EventEngine<X, single>::falls(std::size_t i, bool soon)
 {
     GuardRecord& record = bank_[i];
-    if (record.info.boolean || !resets_any_ || !record.info.resets) return false;
+    if (!has_excursions(i)) return false;
     Excursions& excursions = record.excursions;
-    const double t = step_.start().value;
-    const X& x = search_.before();
     const double interval = bank_.row().interval();
-    double slope = search_.where(i).slope;
-    const auto size = [&] {
-        return std::fmax(std::fabs(bank_.armed_value(i)), std::fabs(slope) * interval / 4);
-    };
     if (!soon) {
-        excursions.pass(size());
+        excursions.pass(size_of_excursion(i, search_.where(i).slope, interval));
         return false;
     }
-    if (excursions.wants_rounding(size())) {
-        excursions.set_rounding(rounding_of(i, mode_before_, t, x));
+    if (excursions.wants_rounding(size_of_excursion(i, search_.where(i).slope, interval))) {
+        excursions.set_rounding(record.noted.rounding);
+    } else {
+        excursions.keep_rounding();
     }
-    // A difference over a part of a step says nothing about a slow guard.
-    const bool resolved = size() > 0x1p20 * excursions.rounding();
-    if (!resolved && !system_->rated && system_->flow) {
-        X rate = x;
-        step_.flow_in(mode_before_, t, x, rate);
-        slope = bank_.view(i, mode_before_, calls()).rate(t, x, rate, 1e5 * low_part * interval);
-    }
-    const bool falls = excursions.fall(size());
-    excursions.end(t, slope);
+    const bool falls = excursions.fall(size_of_excursion(i, record.noted.slope, interval));
+    excursions.end(step_.start().value, record.noted.slope);
     return falls;
+}
+
+template <class X, bool single>
+void EventEngine<X, single>::note_excursions()
+{
+    const Instant at = on_time_ ? Instant{time_event_, 0} : Instant{set_time_, set_remainder_};
+    if (!bank_.row().would_follow_soon(at)) return;
+    const X& x = search_.before();
+    const double interval = bank_.row().interval_to(at);
+    for (const std::size_t i : search_.fired()) {
+        if (!has_excursions(i)) continue;
+        GuardRecord& record = bank_[i];
+        double& slope = record.noted.slope = search_.where(i).slope;
+        const double size = size_of_excursion(i, slope, interval);
+        double rounding = record.excursions.rounding();
+        if (record.excursions.wants_rounding(size)) {
+            rounding = record.noted.rounding = rounding_of(i, step_.mode(), at.value, x);
+        }
+        // A difference over a part of a step says nothing about a slow guard.
+        if (size > 0x1p20 * rounding || system_->rated || !system_->flow) continue;
+        X rate = x;
+        step_.flow_in(step_.mode(), at.value, x, rate);
+        const double scale = 1e5 * low_part * interval;
+        slope = bank_.view(i, step_.mode(), calls()).rate(at.value, x, rate, scale);
+    }
+}
+
+template <class X, bool single>
+inline double EventEngine<X, single>::size_of_excursion(std::size_t i, double slope,
+                                                        double interval) const noexcept
+{
+    return std::fmax(std::fabs(bank_.armed_value(i)), std::fabs(slope) * interval / 4);
 }
 
 template <class X, bool single>

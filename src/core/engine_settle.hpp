@@ -64,6 +64,7 @@ inline bool EventEngine<X, single>::apply_next_set(bool on_time)
     search_.stay_at_start();
     place_set(step_.instant(0, 0));
     leave_from_start();
+    if (on_time) note_vetoes();
     transform(on_time, false);
     stuck_ = on_time ? no_guard : stuck_guard();
     if (stuck_ == no_guard) {
@@ -244,7 +245,7 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
     }
     const Side before = record.side != Side::plateau ? record.side : record.awaited;
     if (record.fired && record.estimated && std::fabs(g) > record.band) {
-        record.band = tolerance_of(i, step_.time(0));
+        record.band = record.noted.value;
     }
     record.estimated = false;
     const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
@@ -315,9 +316,7 @@ bool EventEngine<X, single>::ends_veto(std::size_t i)
     if (!system_->enabled_at || !leaves_phase_ || !on_time_) return false;
     const GuardRecord& record = std::as_const(bank_)[i];
     if (!record.acting || record.fired || record.newly_enabled || record.info.boolean) return false;
-    return lies_within_rounding(i) &&
-           !system_.enabled_at(i, mode_before_, step_.time(0), search_.before()) &&
-           is_enabled_here(i);
+    return record.noted.vetoed && lies_within_rounding(i) && is_enabled_here(i);
 }
 
 template <class X, bool single>
@@ -387,7 +386,8 @@ inline bool EventEngine<X, single>::lies_within_rounding(std::size_t i)
     const double rate = system_->bounded ? bank_.complete_rate0(i, step_, h_next_, calls())
                                          : bank_.rate0(i);  // which may not be known otherwise
     const double moves = std::fabs(rate) * (std::fabs(step_.time(0)) + h_next_);
-    if (!(std::fabs(g) <= 0x1p-20 * std::max(bank_.armed_scale(i, h_next_), moves))) return false;
+    if (!(std::fabs(g) <= part_by_rounding * std::max(bank_.armed_scale(i, h_next_), moves)))
+        return false;
     return std::fabs(g) <= rounding_of(i);
 }
 

@@ -12,7 +12,7 @@ inline bool EventEngine<X, single>::may_tie(std::size_t i) const noexcept
     if (!record.enabled || record.deferred || record.info.boolean) return false;
     if (!record.acting && !time_event_due_) return false;
     if (!counts(record.side, record.info.crossing)) return false;
-    return std::fabs(bank_.g1(i)) <= 0x1p-20 * bank_.scale(i, step_.h());
+    return std::fabs(bank_.g1(i)) <= part_by_rounding * bank_.scale(i, step_.h());
 }
 
 template <class X, bool single>
@@ -98,7 +98,7 @@ void EventEngine<X, single>::note_ties()
         if (record.acting || !may_tie(i)) continue;
         const double rate = rate_of_tie(i);
         if (rate == 0) continue;
-        record.band = 2 * std::fabs(bank_.g1(i));
+        record.noted.band = 2 * std::fabs(bank_.g1(i));
         const Side side = record.side;
         if (counts_at_set(i)) {
             search_.note_at_set(bank_, i, side, rate);

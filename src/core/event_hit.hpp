@@ -17,6 +17,13 @@
 
 namespace ricochet::detail {
 
+/// The part of its scale in a step up to which a guard may be at its surface by rounding alone: a
+/// test that costs nothing, before the rounding is computed. That is 8 units in the last place of
+/// the terms of the guard, which for guards without cancellation is 2^-49 of their scale: terms may
+/// be 2^29 times as large as what is left of them in the step. A guard that moves by its scale in
+/// the step crosses, if rounding alone decides, within the same part of the step beyond its end.
+inline constexpr double part_by_rounding = 0x1p-20;
+
 /// Resolution of events at a given time.
 class EventResolution {
 public:

@@ -45,6 +45,8 @@ public:
           before_(like),
           rate_(like),
           lost_(like),
+          kept_space_(like),
+          kept_rate_(like),
           hits_(guards),
           fired_(guards),
           resolution_(options),
@@ -274,6 +276,29 @@ public:
         has_lost_ = true;
     }
 
+    /// Keeps the work space, in which the set may lie on a line along the flow, for
+    /// `put_space_back` after other searches in the step.
+    void keep_space()
+    {
+        kept_space_ = space_;
+        assign(kept_rate_, rate_);
+        kept_rated_ = rated_at_set_;
+    }
+    void put_space_back()
+    {
+        space_ = kept_space_;
+        assign(rate_, kept_rate_);
+        rated_at_set_ = kept_rated_;
+    }
+
+    /// Whether the state of a note is that of the step's polynomial.
+    [[nodiscard]] bool shows_polynomial() const noexcept
+    {
+        return std::any_of(notes_.begin(), notes_.end(), [this](const Note& note) {
+            return note.state >= states_.size() && note.where.root < at_;
+        });
+    }
+
     /// Value |g| at the set, where `meet_conditions` has evaluated the guard; else NaN.
     [[nodiscard]] double value_at_set(std::size_t i) noexcept
     {
@@ -370,7 +395,7 @@ private:
     {
         if (space_.x.size() != like.size()) {
             space_ = ProbeSpace<X>(like);
-            before_ = rate_ = lost_ = like;
+            before_ = rate_ = lost_ = kept_rate_ = like;
         }
     }
 
@@ -899,6 +924,9 @@ private:
     X before_;
     X rate_;
     X lost_;  ///< see `lost_at_set`
+    ProbeSpace<X> kept_space_;
+    X kept_rate_;
+    bool kept_rated_ = false;
     GuardList<Hit, single> hits_;
     const Hit* first_ = nullptr;      ///< of several candidates; `before_` is the state at its root
     bool goes_straight_ = false;      ///< and `rate_` the flow there

@@ -314,9 +314,26 @@ public:
     {
         for_each_not_at_rest([](GuardRecord& record) { record.fired = false; });
     }
-    void forget_bands() noexcept
+    /// Makes the event tolerances those that have been noted for the set, or zero.
+    void take_bands() noexcept
     {
-        for_each_not_at_rest([](GuardRecord& record) { record.band = 0; });
+        for_each_not_at_rest(
+            [](GuardRecord& record) { record.band = std::exchange(record.noted.band, 0); });
+    }
+
+    /// A guard as it is in the middle of a search, to be put back.
+    struct Kept {
+        std::size_t guard;
+        GuardRecord record;
+        double g0, rate0;
+    };
+    [[nodiscard]] Kept keep(std::size_t i) const { return {i, records_[i], g0_[i], rate0_[i]}; }
+    void put_back(const Kept& kept)
+    {
+        records_[kept.guard] = kept.record;
+        g0_[kept.guard] = kept.g0;
+        rate0_[kept.guard] = kept.rate0;
+        arm(kept.guard, kept.record.side);
     }
 
     /// Width [s] below which a bracket in a step of length h is dominated by the guard's

@@ -63,6 +63,16 @@ private:
     std::size_t size_ = 0;
 };
 
+/// What is found of a guard at a set before its resets are called, for use after them: no function
+/// is called any more in a mode that has been left.
+struct NotedAtSet {
+    double band = 0;      ///< event tolerance
+    double value = 0;     ///< |g| where it fired, if the tolerance is estimated
+    double slope = 0;     ///< [1/s] of an excursion that ends here, and
+    double rounding = 0;  ///< the change of the guard by rounding, where they have to be known
+    bool vetoed = false;  ///< `enabled` rejects an event here
+};
+
 /// State of a guard besides its values.
 struct GuardRecord {
     GuardInfo info;
@@ -85,8 +95,9 @@ struct GuardRecord {
     double band =
         0;  ///< event tolerance: |g| where it fired, up to which it counts as being on its surface
     bool estimated = false;  ///< the tolerance is the error of location, not a value of the guard
-    double from = 0;         ///< [s] offset in the step up to which it has been examined
-    double slope = 0;        ///< [1/s] its rate there; NaN if it is not known
+    NotedAtSet noted;
+    double from = 0;   ///< [s] offset in the step up to which it has been examined
+    double slope = 0;  ///< [1/s] its rate there; NaN if it is not known
     std::uint64_t events = 0;
     double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
     Side last_side = Side::plateau;                          ///< the side it left then

@@ -17,14 +17,11 @@ class Excursions {
 public:
     /// Whether the rounding of the guard has to be known for an excursion of that size: it changes
     /// slowly.
-    [[nodiscard]] bool wants_rounding(double size) noexcept
+    [[nodiscard]] bool wants_rounding(double size) const noexcept
     {
-        if (size > 1024 * rounding_ && age_ < most_age) {
-            ++age_;
-            return false;
-        }
-        return true;
+        return !(size > 1024 * rounding_ && age_ < most_age);
     }
+    void keep_rounding() noexcept { ++age_; }
     void set_rounding(double rounding) noexcept
     {
         rounding_ = rounding;
@@ -39,13 +36,17 @@ public:
         if (!(size > 0)) return 1;
         const double last = std::exchange(last_, size);
         const double part = size / last;
-        // A far larger one begins another motion; one that is far smaller may do so.
-        if (part > 4 && size > 64 * rounding_) {
-            fallen_ = 1;
-        } else if (part > 0) {
-            fallen_ = std::min(fallen_ * std::max(part, 1.0 / 64), 1.0);
-        }
+        // One that is far smaller may begin another motion. One that is larger does so only where
+        // it is not small beside the largest: rounding of other guards may have sustained it.
+        if (part > 0) fallen_ = std::min(fallen_ * std::max(part, 1.0 / 64), 1.0);
         return part;
+    }
+    /// Records one that has not been seen at all: the guard had its next event at time t [s], the
+    /// instant of the event before.
+    void vanish(double t) noexcept
+    {
+        if (lost_++ == 0) lost_from_ = end_;
+        end_ = t;
     }
     /// Records one of that size. False: it is neither lost in the rounding of the guard, nor has it
     /// fallen to a thousandth.
@@ -134,7 +135,7 @@ public:
     /// Whether an acting instant follows the one before so soon that excursions may be lost.
     [[nodiscard]] bool follows_soon(const Instant& t) noexcept
     {
-        interval_ = std::fabs((t.value - last_.value) + (t.remainder - last_.remainder));
+        interval_ = interval_to(t);
         last_ = t;
         if (!std::exchange(started_, true)) return false;
         const bool soon = interval_ <= longest_ / 32;
@@ -142,9 +143,20 @@ public:
         quick_ = soon ? quick_ + 1 : 0;
         return quick_ >= 3;
     }
+    /// Whether an acting instant at t would.
+    [[nodiscard]] bool would_follow_soon(const Instant& t) const noexcept
+    {
+        return started_ && interval_to(t) <= longest_ / 32 && quick_ >= 2;
+    }
+    /// [s] from the last acting instant to t.
+    [[nodiscard]] double interval_to(const Instant& t) const noexcept
+    {
+        return std::fabs((t.value - last_.value) + (t.remainder - last_.remainder));
+    }
     /// [s] since the acting instant before.
     [[nodiscard]] double interval() const noexcept { return interval_; }
 
+    [[nodiscard]] bool is_empty() const noexcept { return guards_ == 0; }
     void clear() noexcept
     {
         if (guards_ == 0) return;

@@ -444,7 +444,7 @@ private:
     /// Whether a guard may tie with the end of the step, before which it has not crossed.
     [[nodiscard]] static bool ties(const Step<X>& step, double from, double to) noexcept
     {
-        return step.is_pinned() && std::fabs(to) <= 0x1p-20 * std::fabs(from);
+        return step.is_pinned() && std::fabs(to) <= part_by_rounding * std::fabs(from);
     }
 
     [[nodiscard]] bool never_sleeps(const GuardRecord& record) const noexcept

@@ -141,6 +141,12 @@ public:
         }
     }
 
+    /// Computes what `interpolate` needs of the flow.
+    void prepare_polynomial() const
+    {
+        if (!kernel_->interpolates() && !state_.host) static_cast<void>(dense());
+    }
+
     /// Interpolates without further evaluations of the flow: on the cubic through both
     /// ends if the method has no dense output of its own.
     void peek(double s, X& x) const

@@ -16,8 +16,11 @@
 #include <vector>
 
 #include "ricochet/detect/extremum.hpp"
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/integrate.hpp"
 #include "ricochet/locate/locators.hpp"
+#include "ricochet/monitor.hpp"
+#include "rk4_host.hpp"
 
 namespace ricochet {
 namespace {
@@ -175,7 +178,8 @@ TEST(Meaning, ABreakawayThatReadsItsLoadAgainSlips)
 
 TEST(Meaning, TheStateBeforeHasLeftItsSideAtThousandsOfRandomPlaces)
 {
-    // Floors at sizes from 1e-6 to 1e6, guards that round in several ways.
+    // Floors at sizes from 1e-6 to 1e6, guards that round in several ways; three events each, by
+    // the loop and in the steps of a host, six to ten a flight.
     std::uint64_t wrong = 0, all = 0;
     for (int k = 0; k < 400; ++k) {
         const double size = std::pow(10.0, -6 + 12.0 * k / 400);
@@ -201,10 +205,16 @@ TEST(Meaning, TheStateBeforeHasLeftItsSideAtThousandsOfRandomPlaces)
             const auto run = integrate(ball, Array<2>{2 * floor, 0.1 * std::sqrt(floor)},
                                        {.t_end = 100 * std::sqrt(size)});
             EXPECT_EQ(run.outcome, Outcome::stopped_by_event);
+            EventMonitor monitor(ball, Array<2>{});
+            const double h = 0.3 * std::sqrt(floor);
+            const auto host =
+                test::drive(ball, monitor, Array<2>{2 * floor, 0.1 * std::sqrt(floor)},
+                            100 * std::sqrt(size), h);
+            EXPECT_EQ(host.outcome, Outcome::stopped_by_event);
         }
     }
     EXPECT_EQ(wrong, 0U) << "of " << all;
-    EXPECT_EQ(all, 4800U);
+    EXPECT_EQ(all, 9600U);
 }
 
 // --- resets that write the same component ---
@@ -285,9 +295,9 @@ TEST(Meaning, FifteenThousandRandomSetsMeanWhatEveryOrderMeans)
 {
     // All guards fall at t = 1 and none is turned back, so a set has one meaning where all orders
     // of its resets end alike. Then it has that value; and whatever it is, the declared order does
-    // not matter.
+    // not matter. The first 1000 happen in a host, too.
     std::mt19937 random(17);
-    int with_one_meaning = 0, conflicts = 0;
+    int with_one_meaning = 0, conflicts = 0, in_hosts = 0;
     for (int k = 0; k < 15'000; ++k) {
         std::vector<Operation> resets(2 + random() % 3);
         for (Operation& reset : resets) reset = random_operation(random);
@@ -311,6 +321,11 @@ TEST(Meaning, FifteenThousandRandomSetsMeanWhatEveryOrderMeans)
             };
             const auto run = integrate(machine, x0, {.t_end = 1.5, .step = 1}, FixedStep<Rk4>{});
             runs.emplace_back(run.outcome, run.outcome == Outcome::reached_end ? run.x : x0);
+            if (k >= 1000) continue;
+            EventMonitor monitor(machine, Array<4>{});
+            const auto host = test::drive(machine, monitor, x0, 1.5, 0.7);
+            runs.emplace_back(host.outcome, host.outcome == Outcome::reached_end ? host.x : x0);
+            ++in_hosts;
         } while (std::next_permutation(order.begin(), order.end()));
 
         for (const auto& run : runs) ASSERT_EQ(run, runs[0]) << k;
@@ -322,6 +337,7 @@ TEST(Meaning, FifteenThousandRandomSetsMeanWhatEveryOrderMeans)
         ASSERT_EQ(runs[0].first, Outcome::reached_end) << k;
         ASSERT_EQ(runs[0].second, ends[0]) << k;
     }
+    EXPECT_GT(in_hosts, 5000);
     EXPECT_GT(with_one_meaning, 5000);
     EXPECT_GT(conflicts, 1000);
 }
@@ -734,6 +750,112 @@ TEST(Meaning, ATouchOfADisabledGuardIsCountedAndNotRecorded)
                    }
                });
     }
+}
+
+// --- modes that have been left ---
+
+/// A motion that changes its mode at guard 0, beside guards that are only recorded: their crossings
+/// lie before the events, on them, or touch. Counts the calls in another mode than the present one.
+struct Leaving {
+    using State = Array<2>;
+    static constexpr std::size_t guard_count = 5, mode_count = 2;
+    Mode* now;
+    int* late;
+
+    void see(Mode m) const { *late += m != *now; }
+    void flow(Mode m, double t, const State& x, State& dxdt) const
+    {
+        see(m);
+        dxdt = {m == 1 ? x[1] : 0.1 * std::sin(t) - 1, m == 1 ? -1 : 0.3 * std::cos(3 * t)};
+    }
+    [[nodiscard]] double guard(std::size_t i, Mode m, double t, const State& x) const
+    {
+        see(m);
+        switch (i) {
+            case 0: return m == 1 ? x[0] - 0.2 : x[0];
+            case 1: return x[0] - 0.05;
+            case 2: return x[0] * (1 + 0.1 * x[0]);
+            case 3: return x[1] - 0.1;
+            default: return 1 - std::cos(4 * std::numbers::pi * t);
+        }
+    }
+    [[nodiscard]] bool enabled(std::size_t, Mode m, double, const State&) const
+    {
+        see(m);
+        return true;
+    }
+    Mode reset(std::size_t, Mode m, double, State& x) const
+    {
+        see(m);
+        x = m == 0 ? State{0.2, 1} : State{0.5, 0.1};
+        return *now = 1 - m;
+    }
+    [[nodiscard]] double next_time_event(double t) const
+    {
+        return 0.35 * (std::floor(t / 0.35 + 1e-9) + 1);
+    }
+    Mode time_reset(Mode m, double, State&) const { return m; }
+    [[nodiscard]] GuardInfo guard_info(std::size_t i) const
+    {
+        return {.crossing = i == 0 ? Crossing::falling : Crossing::either, .resets = i == 0};
+    }
+};
+
+/// The same with a bound on how fast its guards change.
+struct BoundedLeaving : Leaving {
+    [[nodiscard]] double speed_bound(std::size_t, Mode, double, const State&) const { return 40; }
+};
+
+TEST(Meaning, NoFunctionIsCalledInAModeThatHasBeenLeft)
+{
+    Mode now = 0;
+    int late = 0;
+    const auto expect_none = [&](const auto& run, const std::string& label) {
+        EXPECT_EQ(std::exchange(late, 0), 0) << label;
+        EXPECT_EQ(run.outcome, Outcome::reached_end) << label;
+        EXPECT_GT(run.events.size(), 100U) << label;
+        now = 0;
+    };
+    const Leaving leaving{&now, &late};
+    const Leaving::State x0{0.5, 0.1};
+    by_all(leaving, x0, {.t_end = 30}, expect_none);
+    expect_none(
+        integrate(leaving, x0, {.t_end = 30, .record_steps = true}, ErrorControlled<Fehlberg78>{}),
+        "recorded steps");
+    const BoundedLeaving bounded{{&now, &late}};
+    expect_none(
+        integrate(bounded, x0, {.t_end = 30}, ErrorControlled<Dopri5>{}, Planned<Extremum>{}),
+        "planned");
+    EventMonitor monitor(leaving, Leaving::State{});
+    expect_none(test::drive(leaving, monitor, x0, 30, 0.05), "host");
+}
+
+TEST(Meaning, NoFunctionIsCalledInAModeThatHasBeenLeftByAnEventOfACycle)
+{
+    // Two tanks, whose events accumulate at t = 2: 20 is where a level has a rounding.
+    Mode now = 0;
+    int late = 0;
+    Machine<Array<2>> tanks;
+    tanks.guard_count_ = tanks.mode_count_ = 2;
+    tanks.f = [&](Mode m, double, const auto&, auto& dxdt) {
+        late += m != now;
+        dxdt = {m == 0 ? 2 : -2, m == 1 ? 1 : -3};
+    };
+    tanks.g = [&](std::size_t i, Mode m, double, const auto& x) {
+        late += m != now;
+        return x[i] - 20;
+    };
+    tanks.r = [&](std::size_t i, Mode m, double, auto& x) -> Mode {
+        late += m != now;
+        x[i] = 20;
+        return now = static_cast<Mode>(i);
+    };
+    by_all(tanks, Array<2>{21, 21}, {.t_end = 3}, [&](const auto& run, const std::string& label) {
+        EXPECT_EQ(run.outcome, Outcome::zeno) << label;
+        EXPECT_NEAR(run.t, 2, 1e-11) << label;
+        EXPECT_EQ(std::exchange(late, 0), 0) << label;
+        now = 0;
+    });
 }
 
 // --- runs that follow each other ---

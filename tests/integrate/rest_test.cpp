@@ -147,6 +147,19 @@ TEST(Limits, OfAThousandRandomCyclesAreWithinTheirErrors)
     for (const auto& [fault, count] : faults) ADD_FAILURE() << fault;
 }
 
+TEST(Limits, OfCyclesWhoseCoarsestGuardHidesItsFlights)
+{
+    // Cycles over places near 0 and far from it. At the far ones the last flights are shorter than
+    // a double shows, and happen at the instant of the event before; or their rounding throws the
+    // motion back at each round, so that it would go on for ever (the first five).
+    for (const std::uint64_t seed : {24690, 30072, 30666, 41139, 97422, 37293, 16854, 42336, 23526,
+                                     20121, 55644, 82020, 12645, 48831}) {
+        const CycleCase cycle = RandomCycles(seed).any();
+        EXPECT_EQ(test::fault_of(cycle, ErrorControlled<Fehlberg78>{}), "") << seed;
+        EXPECT_EQ(test::fault_of(cycle, ErrorControlled<Dopri5>{}), "") << seed;
+    }
+}
+
 TEST(Limits, AreNotSeenInClocksThatStrikeAlmostTogether)
 {
     EXPECT_TRUE(test::clocks_run({0, 11, 17, 20, 21, 22}));

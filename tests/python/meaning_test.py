@@ -71,6 +71,7 @@ def test_resets_whose_order_matters_conflict():
     for both in (events, events[::-1]):
         result = solve(lambda t, y: [0.0], 2, [-4.5], both)
         assert not result.success and "order" in result.message
+        assert result.message.endswith(": events[0], events[1]")
 
 
 def test_events_that_change_a_variable_of_the_flow_or_of_the_event_cut_the_step():
