@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "ricochet/detail/refusals.hpp"
+
 namespace ricochet::detail {
 
 namespace {
@@ -30,7 +32,7 @@ void throw_wrong_tolerances(std::size_t components, std::size_t tolerances)
 
 void throw_start_empty(std::string_view who)
 {
-    throw std::invalid_argument(fmt::format("{}: the start must have components, got none", who));
+    throw StartRefused(fmt::format("{}: the start must have components, got none", who));
 }
 
 void throw_no_reset(std::string_view who, std::size_t which, std::string_view name)
@@ -57,10 +59,10 @@ void throw_bad_touch(std::string_view who, std::size_t which, std::string_view n
 void throw_unknown_mode(std::string_view who, std::size_t mode, std::size_t modes)
 {
     if (modes == 1) {
-        throw std::invalid_argument(
+        throw StartRefused(
             fmt::format("{}: mode must be 0, the only one of the system, got {}", who, mode));
     }
-    throw std::invalid_argument(fmt::format(
+    throw StartRefused(fmt::format(
         "{}: mode must be below the system's mode_count = {}, got {}", who, modes, mode));
 }
 
@@ -113,12 +115,12 @@ void throw_time_event_not_ahead(std::string_view who, bool backward, bool by_sta
                                 double found)
 {
     if (by_state && !backward) {
-        throw std::invalid_argument(
+        throw StartRefused(
             fmt::format("{}: next_time_event(t, x) must return t or a time after it, or infinity; "
                         "at the start t = {} it returned {}",
                         who, t, found));
     }
-    throw std::invalid_argument(fmt::format(
+    throw StartRefused(fmt::format(
         "{}: {} must return a time {} t, t excluded, or {}infinity; at the start t = {} it "
         "returned {}",
         who, backward ? "previous_time_event(t)" : "next_time_event(t)",
@@ -127,7 +129,7 @@ void throw_time_event_not_ahead(std::string_view who, bool backward, bool by_sta
 
 void throw_start_not_finite(std::string_view who, std::size_t component, double value)
 {
-    throw std::invalid_argument(
+    throw StartRefused(
         fmt::format("{}: the start must be finite, got {} in component {}", who, value, component));
 }
 
@@ -158,7 +160,7 @@ void throw_run_is_over(std::string_view who)
 void throw_start_outside_mode(std::string_view who, std::size_t which, std::string_view name,
                               double t, double guard)
 {
-    throw std::invalid_argument(
+    throw StartRefused(
         fmt::format("{}: the start lies behind {}, which bounds the motion: "
                     "expected guard >= 0 at t = {}, got {}",
                     who, guard_called(which, name), t, guard));
@@ -167,7 +169,7 @@ void throw_start_outside_mode(std::string_view who, std::size_t which, std::stri
 void throw_start_guard_not_finite(std::string_view who, std::size_t which, std::string_view name,
                                   double t, double guard)
 {
-    throw std::invalid_argument(fmt::format("{}: {} must be finite at the start, got {} at t = {}",
+    throw StartRefused(fmt::format("{}: {} must be finite at the start, got {} at t = {}",
                                             who, guard_called(which, name), guard, t));
 }
 

@@ -6,12 +6,12 @@ namespace ricochet::detail {
 
 void refuse_inclusion(std::string_view what)
 {
-    throw std::invalid_argument(fmt::format("inclusion: {}", what));
+    throw InclusionRefused(fmt::format("inclusion: {}", what));
 }
 
 void refuse_inclusion(std::string_view what, double given)
 {
-    throw std::invalid_argument(fmt::format("inclusion: {} {}", what, given));
+    throw InclusionRefused(fmt::format("inclusion: {} {}", what, given));
 }
 
 namespace {

@@ -15,6 +15,7 @@
 #include "ricochet/detail/hand_over_watches.hpp"
 #include "ricochet/detail/held_reactions.hpp"
 #include "ricochet/detail/law.hpp"
+#include "ricochet/detail/refusals.hpp"
 
 namespace ricochet::detail {
 
@@ -115,7 +116,7 @@ private:
         std::unique_ptr<EventLoop<N>> simulation;
         try {
             simulation = stepping_.make(modes_, x, event_options());
-        } catch (const std::invalid_argument&) {
+        } catch (const StartRefused&) {
             return go_by_steps(PhaseCause::stuck);  // next to a surface by more than rounding
         }
         ChatterWatch watch(run_.state.t, options_.set_valued.step / 100);
@@ -390,7 +391,7 @@ private:
         if (std::exchange(keeps_reaction_, false)) return;
         try {
             motion_.restart(run_.state.t, run_.state.w);
-        } catch (const std::invalid_argument&) {
+        } catch (const InclusionRefused&) {
             end_with(run_.state.w.allFinite() ? Outcome::not_converged : Outcome::non_finite);
         }
     }
@@ -499,7 +500,7 @@ private:
         Mode mode = Modes::several;
         try {
             mode = modes_.mode_at(t, w);
-        } catch (const std::invalid_argument&) {
+        } catch (const InclusionRefused&) {
         }
         if (mode >= Modes::branch_modes) return false;
         run_.state = motion_.state();

@@ -4,17 +4,24 @@
 #pragma once
 
 #include <cstddef>
+#include <stdexcept>
 #include <string_view>
 
 namespace ricochet::detail {
 
-/// @throws std::invalid_argument: the start has no components.
+/// No run can start in a mode at (t, x). A type of its own, so that a run in several parts knows it
+/// from what a function of the system throws.
+struct StartRefused : std::invalid_argument {
+    using std::invalid_argument::invalid_argument;
+};
+
+/// @throws StartRefused: the start has no components.
 [[noreturn]] void throw_start_empty(std::string_view who);
-/// @throws std::invalid_argument: the start is not finite.
+/// @throws StartRefused: the start is not finite.
 [[noreturn]] void throw_start_not_finite(std::string_view who, std::size_t component, double value);
 /// @throws std::invalid_argument: the numbers of absolute tolerances and of components differ.
 [[noreturn]] void throw_wrong_tolerances(std::size_t components, std::size_t tolerances);
-/// @throws std::invalid_argument: the start is behind a unilateral guard.
+/// @throws StartRefused: the start is behind a unilateral guard.
 [[noreturn]] void throw_start_outside_mode(std::string_view who, std::size_t which,
                                            std::string_view name, double t, double guard);
 /// @throws std::invalid_argument: a unilateral guard without a reset.
@@ -25,12 +32,12 @@ namespace ricochet::detail {
 /// @throws std::invalid_argument: an invalid tolerance of touches.
 [[noreturn]] void throw_bad_touch(std::string_view who, std::size_t which, std::string_view name,
                                   double touch);
-/// @throws std::invalid_argument: a guard is not finite at the start.
+/// @throws StartRefused: a guard is not finite at the start.
 [[noreturn]] void throw_start_guard_not_finite(std::string_view who, std::size_t which,
                                                std::string_view name, double t, double guard);
 /// @throws std::invalid_argument: the flow gives its rate another dimension at the start.
 [[noreturn]] void throw_flow_does_not_fit(std::string_view who, std::size_t components);
-/// @throws std::invalid_argument: the system does not have the start mode.
+/// @throws StartRefused: the system does not have the start mode.
 [[noreturn]] void throw_unknown_mode(std::string_view who, std::size_t mode, std::size_t modes);
 /// @throws std::invalid_argument: error control by a method without an estimate.
 [[noreturn]] void throw_no_error_estimate();
@@ -38,7 +45,7 @@ namespace ricochet::detail {
 [[noreturn]] void throw_forward_only();
 /// @throws std::invalid_argument: no previous_time_event for a run backward in time.
 [[noreturn]] void throw_no_previous_time_event();
-/// @throws std::invalid_argument: the first time event is not ahead of the start; that of a timer
+/// @throws StartRefused: the first time event is not ahead of the start; that of a timer
 /// in the state, `by_state`, may be at the start.
 [[noreturn]] void throw_time_event_not_ahead(std::string_view who, bool backward, bool by_state,
                                              double t, double found);

@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "ricochet/detail/free_flight.hpp"
+#include "ricochet/detail/refusals.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
 
@@ -122,7 +123,7 @@ private:
         std::unique_ptr<EventLoop<2 * N>> simulation;
         try {
             simulation = stepping_.make(flight_, run_.x, flight_options());
-        } catch (const std::invalid_argument&) {
+        } catch (const StartRefused&) {
             return touch_down(PhaseCause::stuck);  // behind a contact by more than rounding
         }
         ChatterWatch watch(run_.t, options_.set_valued.step / 100);

@@ -24,6 +24,7 @@
 #include "ricochet/detail/hand_over_watches.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/padded_run.hpp"
+#include "ricochet/detail/refusals.hpp"
 #include "ricochet/detail/refused_calls.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
@@ -150,6 +151,8 @@ struct MixedRun {
     double t = 0;
     X x{};
     Mode mode = 0;
+    /// As in `Run`: the guard that ended the run, and the other one of two that conflict.
+    std::size_t guard = no_guard, other_guard = no_guard;
     std::string reason;  ///< text of the `Stop` that ended the run
     std::vector<Event<X>> events;
     std::vector<Phase> phases;
@@ -280,8 +283,8 @@ private:
         std::optional<Loop> simulation;
         try {
             simulation.emplace(system_, run_.x, options, stepping_, detector_, locator_);
-        } catch (const std::invalid_argument&) {
-            if (run_.phases.size() == 1) throw;  // an invalid argument of the caller
+        } catch (const detail::StartRefused&) {
+            if (run_.phases.size() == 1) throw;  // the start of the caller
             return PhaseCause::stuck;
         }
         detail::ChatterWatch watch(run_.t, hand_over_.set_valued.step / 100);
@@ -303,9 +306,26 @@ private:
         append(done.trajectory);
         detail::add(run_.statistics.event_driven, done.statistics);
         if (chatters) return PhaseCause::chattering;
-        if (const auto cause = detail::cause_after(done.outcome)) return cause;
+        const auto cause = detail::cause_after(done.outcome);
+        if (cause && is_near_surface()) return cause;
         run_.outcome = done.outcome;
+        run_.guard = done.guard;
+        run_.other_guard = done.other_guard;
         return std::nullopt;
+    }
+
+    /// Whether some reaction may hold its y here. Where all y are farther from zero than the error
+    /// of a thousand steps, what ends the events has nothing to do with the inclusion.
+    [[nodiscard]] bool is_near_surface() const
+    {
+        constexpr int N = detail::solver_components<state_size<Set>, reaction_size<Set>>;
+        constexpr int M = detail::solver_reactions<state_size<Set>, reaction_size<Set>>;
+        const detail::AnyMatrices<N, M> matrices(detail::solver_inclusion(set_));
+        if (!matrices.traits().of_reactions()) return true;
+        Vector w(static_cast<Eigen::Index>(run_.x.size()));
+        typename detail::AnyMatrices<N, M>::Reaction y;
+        matrices.observed(run_.t, detail::resized<N>(detail::converted_state(run_.x, w)), y);
+        return y.head(matrices.own_reactions()).cwiseAbs().minCoeff() <= 1e3 * error_of(run_.x);
     }
 
     /// Whether the run is over.

@@ -542,7 +542,13 @@ constexpr Confines confines() noexcept
     }
 }
 
-/// @throws std::invalid_argument with the message "inclusion: <what> <given>".
+/// A state, a set or a matrix with which no motion can start. A type of its own, so that a run in
+/// several phases knows it from what a function of the system throws.
+struct InclusionRefused : std::invalid_argument {
+    using std::invalid_argument::invalid_argument;
+};
+
+/// @throws InclusionRefused with the message "inclusion: <what> <given>".
 [[noreturn]] void refuse_inclusion(std::string_view what);
 [[noreturn]] void refuse_inclusion(std::string_view what, double given);
 

@@ -411,7 +411,7 @@ private:
         zero_observed(which);
         try {
             now_.reaction = minimal_selection(step_.matrices(), now_.t, now_.w);
-        } catch (const std::invalid_argument&) {
+        } catch (const InclusionRefused&) {
             // There is no minimal selection: the solver's reaction is kept.
         }
         step_.branches_of(now_, start_branches_);
