@@ -30,7 +30,7 @@ struct Slider {
     std::function<void(double t, const State& x, State& dxdt)> f;
     double friction = 1, belt = 0;
     std::vector<OwnGuard<N>> own{};
-    std::function<double(double t)> next{};       ///< the next time event
+    std::function<double(double t)> next{};          ///< the next time event
     std::function<void(double t, State& x)> kick{};  ///< its reset
 
     void flow(double t, const State& x, State& dxdt) const

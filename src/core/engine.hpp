@@ -71,6 +71,8 @@ protected:
           finders_{setup.detector, setup.detecting, setup.locator, setup.locating},
           error_controlled_(setup.error_controlled),
           guarded_(system_->guarded),
+          phases_(system_->phases),
+          own_guards_(phases_ ? phases_->own_guards(setup.door) : no_guard),
           resets_any_(system_->resets()),
           timed_(system_->timed()),
           defers_(defers(setup.detector, *setup.system)),
@@ -103,6 +105,35 @@ protected:
         return {.from = std::min(options.t_start, options.t_end),
                 .to = std::max(options.t_start, options.t_end)};
     }
+
+    // --- phases ---
+
+    /// Whether guard i belongs to the phases, not to the system.
+    [[nodiscard]] bool is_of_phases(std::size_t i) const noexcept
+    {
+        return i >= own_guards_ && i != no_guard && i != time_event_reset;
+    }
+    /// The mode of the system.
+    [[nodiscard]] Mode shown(Mode mode) const noexcept { return phases_ ? own_mode(mode) : mode; }
+
+    /// Lets the phases decide how the motion goes on after the resets of a set.
+    [[gnu::noinline]] void decide(bool on_time, double t)
+    {
+        if (resets_.conflict().first != no_guard || shown(resets_.mode()) >= own_modes - 1) return;
+        const PhaseSet<X> set{search_.fired().span(),
+                              on_time,
+                              std::exchange(on_change_, false),
+                              t,
+                              step_.mode(),
+                              resets_.mode(),
+                              search_.before()};
+        resets_.move_to(phases_->decide(system_.door(), set, resets_.after()));
+    }
+
+    /// Records the changes of reactions at a set that no guard of the system stands for.
+    [[gnu::noinline]] void record_changes(double t, bool located);
+    /// The change of a reaction that is recorded under a guard of the system, or null.
+    [[nodiscard, gnu::noinline]] const ReactionChange* change_under(std::size_t guard);
 
     /// Number of modes; 0: not declared. A system without modes is always in mode 0.
     [[nodiscard]] std::size_t modes() const { return system_->moded ? system_.modes() : 1; }
@@ -184,8 +215,10 @@ protected:
     /// Whether the timers in the state have shown to be without an end at this instant.
     [[nodiscard]] bool timer_is_endless();
 
-    /// Applies a time event at the start of the step; `settle` deals with its consequences.
-    void apply_time_event();
+    /// Applies a set without guards at the start of the step: a time event, or a change that the
+    /// stepper has located. `settle` deals with its consequences.
+    void apply_without_guards(bool on_time);
+    void apply_time_event() { apply_without_guards(true); }
 
     /// After a time event the flow is that of the double after it, where it jumps there.
     void start_beyond_time_event()
@@ -359,6 +392,7 @@ protected:
         const double t = on_time ? time_event_ : time_of_set();
         resets_.apply(system_, bank_, {search_.fired().span(), on_time, step_.mode(), t},
                       search_.before(), Stands{*this, t, located});
+        if (phases_) decide(on_time, t);
     }
 
     /// Whether guard i moves along the flow of a mode at x in the direction of its event. Nothing
@@ -744,7 +778,7 @@ protected:
     {
         run_.armed_beyond.clear();
         if (run_.statistics.armed_beyond == 0) return;
-        for (std::size_t i = 0; i < bank_.size(); ++i) {
+        for (std::size_t i = 0; i < std::min(bank_.size(), own_guards_); ++i) {
             if (std::as_const(bank_)[i].armed_beyond) run_.armed_beyond.push_back(i);
         }
     }
@@ -834,6 +868,8 @@ protected:
     void record(Event<X>&& event)
     {
         if (!options_.record_events) return;
+        event.mode_before = shown(event.mode_before);
+        event.mode_after = shown(event.mode_after);
         if (setup_.add_event) return setup_.add_event(setup_.events, event);
         make_room(run_.events);
         run_.events.push_back(std::move(event));
@@ -880,6 +916,8 @@ protected:
     Finders<X> finders_;
     bool error_controlled_;
     bool guarded_;     ///< has guards, even if their number is zero so far
+    const PhaseTable<X>* phases_;
+    std::size_t own_guards_;  ///< number of guards of the system, without those of the phases
     bool resets_any_;  ///< has resets
     bool timed_;
     std::conditional_t<single, Never, bool> defers_;  ///< only the loop of any number plans
@@ -900,6 +938,8 @@ protected:
     bool watching_ = false;    ///< rates are sampled too, since every step is checked
     double time_event_ = std::numeric_limits<double>::infinity();
     bool time_event_due_ = false;
+    bool change_due_ = false;  ///< the step ends at a change that its stepper has located
+    bool on_change_ = false;   ///< the current set lies there
     double passed_ = std::numeric_limits<double>::quiet_NaN();  ///< the last time event
     bool due_here_ = false;            ///< a time event is due at the start of the step
     bool timer_idles_ = false;         ///< the last time event of this instant changed nothing

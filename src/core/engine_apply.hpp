@@ -25,12 +25,14 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
     mode_before_ = step_.mode();
     if (on_time) record_time_event(t);
     for (const std::size_t i : search_.fired()) record_crossing(i, t, located);
+    if (phases_) record_changes(t, located);
     if (!goes_on()) {
         step_.restart(at, search_.before(), step_.mode());
         return;
     }
     if (resets_.stops()) note_stop();
-    changed_mode_ = enters_mode_ = resets_.mode() != step_.mode();
+    changed_mode_ = resets_.mode() != step_.mode();
+    enters_mode_ = shown(resets_.mode()) != shown(step_.mode());
     if (system_->next_time_event_at) {
         const bool changes = changed_mode_ || !same_state(resets_.after(), search_.before());
         timer_idles_ = !changes && (on_time || (timer_idles_ && !located));
@@ -186,16 +188,17 @@ inline bool EventEngine<X, single>::timer_is_endless()
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::apply_time_event()
+inline void EventEngine<X, single>::apply_without_guards(bool on_time)
 {
     bank_.take_bands();
     search_.fired().clear();
     assign(search_.before(), step_.x0());
     leave_from_start();
-    note_vetoes();
-    transform(true, false);
+    if (on_time) note_vetoes();
+    if (phases_) place_set(step_.instant(0, 0));
+    transform(on_time, false);
     note_left_alone(false);
-    apply(false, true);
+    apply(false, on_time);
 }
 
 }  // namespace ricochet::detail

@@ -116,9 +116,11 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
         if (search_.late()) ++run_.statistics.late_events;
         dismiss_members();
         on_time_ = time_event_due_ && search_.at() == step_.h();
+        on_change_ = change_due_ && search_.at() == step_.h();
         if (search_.fired().empty() && !(tied && on_time_)) continue;
-        const bool met = tied ? search_.meet_conditions_on_time(step_, bank_, calls())
-                              : on_time_ || search_.meet_conditions(step_, bank_, calls());
+        const bool met =
+            tied ? search_.meet_conditions_on_time(step_, bank_, calls())
+                 : on_time_ || on_change_ || search_.meet_conditions(step_, bank_, calls());
         run_.statistics.unmet_conditions += !met;
         left_known_ = system_->moded;
         if (left_known_) {
@@ -231,6 +233,7 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::ends_run(std::size_t i) const noexcept
 {
     const GuardRecord& record = bank_[i];
+    if (is_of_phases(i)) return false;
     if (options_.stop_at_event) return true;
     return record.info.stop_after > 0 &&
            record.events + search_.noted(i) + 1 >= record.info.stop_after;

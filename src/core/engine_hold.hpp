@@ -207,7 +207,7 @@ void EventEngine<X, single>::release_here(std::size_t k)
             .after = step_.x0(),
             .bracket = {t, t},
             .slope = 0});
-    bank_.forget_bands();
+    bank_.take_bands();
     release(k);
     leaves_phase_ = changed_mode_ = enters_mode_ = false;
     if (!step_.is_of_host()) step_.refresh();

@@ -142,7 +142,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::count_event(std::size_t i, double t, Side side)
 {
     GuardRecord& record = bank_[i];
-    ++run_.statistics.events;
+    run_.statistics.events += !is_of_phases(i);
     ++record.events;
     record.last = t;
     record.last_side = side;
@@ -185,11 +185,16 @@ inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, boo
     // At the start of a step the guard has been armed on the side to which it has been carried.
     const Side side = bank_[i].side;
     count_event(i, t, located ? side : opposite(side));
+    const ReactionChange* const change = phases_ ? change_under(i) : nullptr;
+    if (phases_ && !phases_->records(system_.door(), i)) {
+        run_.statistics.events -= !is_of_phases(i);
+        return;
+    }
     if (!options_.record_events) return;
     static constexpr Location here{};
     const Location& where = located ? search_.where(i) : here;
     record({.t = t,
-            .kind = kind_of(where),
+            .kind = change ? change->kind : kind_of(where),
             .guard = i,
             .mode_before = step_.mode(),
             .mode_after = resets_.mode(),
@@ -198,7 +203,45 @@ inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, boo
             .bracket = bracket_of(where, t),
             .slope = where.slope,
             .error = where.error,
-            .late = located && search_.late()});
+            .late = located && search_.late(),
+            .reaction = change ? change->reaction : no_reaction});
+}
+
+template <class X, bool single>
+const ReactionChange* EventEngine<X, single>::change_under(std::size_t guard)
+{
+    for (const ReactionChange& change : phases_->changes(system_.door())) {
+        if (change.guard == guard) return &change;
+    }
+    return nullptr;
+}
+
+template <class X, bool single>
+void EventEngine<X, single>::record_changes(double t, bool located)
+{
+    const bool led = !search_.fired().empty() || on_time_;
+    for (const ReactionChange& change : phases_->changes(system_.door())) {
+        if (change.guard != no_guard) continue;
+        ++run_.statistics.events;
+        if (options_.stop_at_event) {
+            stops_ = true;
+            if (!led) stopper_ = no_guard;
+        }
+        const bool found = located && change.fired != no_guard;
+        const Location where = found ? search_.where(change.fired) : Location{};
+        record({.t = t,
+                .kind = change.kind,
+                .guard = no_guard,
+                .mode_before = step_.mode(),
+                .mode_after = resets_.mode(),
+                .before = search_.before(),
+                .after = resets_.after(),
+                .bracket = found ? bracket_of(where, t) : Bracket{t, t},
+                .slope = where.slope,
+                .error = where.error,
+                .reaction = change.reaction});
+    }
+    if (is_of_phases(stopper_)) stopper_ = no_guard;
 }
 
 template <class X, bool single>
@@ -260,6 +303,7 @@ inline void EventEngine<X, single>::record_notes(double s)
     for (const Note& note : search_.notes()) {
         const double t = time_of(note, s);
         count_event(note.guard, t, note.side);
+        if (is_of_phases(note.guard)) continue;
         bank_[note.guard].returned = note.kind == EventKind::touch;
         if (!options_.record_events) continue;
         Event<X> event{.t = t,

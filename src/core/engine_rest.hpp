@@ -216,7 +216,7 @@ inline double EventEngine<X, single>::distance_put_back(std::size_t i)
 template <class X, bool single>
 inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, double error)
 {
-    if (!system_->rest || bank_[i].intervals.outlast_rest()) {
+    if (!system_->rest || is_of_phases(i) || bank_[i].intervals.outlast_rest()) {
         end(Outcome::zeno, i);
         run_.other_guard = other_of_cycle(i);
         return;
@@ -256,7 +256,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
         return end(Outcome::non_finite, i);
     }
     leaves_phase_ = false;
-    enters_mode_ = mode_after != mode;
+    enters_mode_ = shown(mode_after) != shown(mode);
     if (!holds_.empty()) release_changed(before, after, enters_mode_);
     step_.restart(ahead, 0, after, mode_after);
     start_beyond_time_event();

@@ -17,6 +17,7 @@
 #include "core/event_sets.hpp"
 #include "core/loop_events.hpp"
 #include "core/loop_output.hpp"
+#include "core/loop_phases.hpp"
 #include "core/loop_planned.hpp"
 #include "core/loop_quiet.hpp"
 #include "core/loop_restart.hpp"
@@ -129,6 +130,7 @@ template <class X>
 QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
 {
     const SystemTable<X>& system = *setup.system;
+    if (system.phases) return nullptr;
     if (setup.quiet || !setup.error_controlled) return setup.quiet;
     const NamedKernel<X>* const named = named_kernel(setup.kernel);
     if (!named) return nullptr;

@@ -77,6 +77,7 @@ public:
         if (guarded_) this->arm_at_start(!options_.continues);
         if (endless_ && !this->may_end()) throw_endless(options.t_end);
         if (guarded_ || timed_) this->settle_all();
+        if (phases_) review_phase(false);
     }
 
     [[nodiscard]] double t() const noexcept override  ///< [s]
@@ -104,7 +105,7 @@ public:
             case Showing::event: return run_.events[shown_records_ - 1].mode_after;
             case Showing::step: break;
         }
-        return step_.mode();
+        return this->shown(step_.mode());
     }
     [[nodiscard]] bool ended() const noexcept override { return ended_; }
     /// Result so far; `finish` brings its time and state up to date.
@@ -209,6 +210,7 @@ private:
     using Engine::backward_;
     using Engine::bank_;
     using Engine::calls;
+    using Engine::change_due_;
     using Engine::defers_;
     using Engine::due_here_;
     using Engine::end;
@@ -223,9 +225,11 @@ private:
     using Engine::last_h_;
     using Engine::meter_;
     using Engine::newly_armed_;
+    using Engine::on_change_;
     using Engine::on_time_;
     using Engine::options_;
     using Engine::pending_;
+    using Engine::phases_;
     using Engine::planner_;
     using Engine::resolution_;
     using Engine::resting_;
@@ -263,7 +267,9 @@ private:
     void advance_one(const Advance& how)
     {
         if (mark_) return advance_resumably(how);
+        const std::uint64_t steps = run_.statistics.steps;
         advance_from_here(how);
+        if (phases_) review_phase(run_.statistics.steps != steps);
     }
     [[gnu::noinline]] void advance_resumably(const Advance& how);
     [[gnu::always_inline]] void advance_from_here(const Advance& how);
@@ -298,6 +304,7 @@ private:
         std::uint64_t disabled = 0;
         std::size_t events = 0, samples = 0, pieces = 0, next_sample = 0;
         std::size_t tentative = 0;  ///< number of steps that were not yet closed
+        std::vector<double> phases{};
         bool planned = false;       ///< the guards are left alone until their deadlines
         bool newly_armed = false;
         bool everything = false;  ///< the members below are kept, too
@@ -318,6 +325,7 @@ private:
     }
 
     void mark_step() noexcept;
+    void mark_phases();
     /// Keeps the state of the guards before events change it.
     void mark_everything()
     {
@@ -422,10 +430,11 @@ private:
     /// Accepts the step, with a time event at its end if one is due.
     void pass()
     {
-        if (timed_ && time_event_due_) {
+        if ((timed_ && time_event_due_) || change_due_) {
             mark_everything();
             accept();
-            this->apply_time_event();
+            on_change_ = std::exchange(change_due_, false);
+            this->apply_without_guards(timed_ && time_event_due_);
             return settle_and_record();
         }
         accept();
@@ -480,6 +489,9 @@ private:
     /// Takes a step no longer than `remaining` [s] or the time to the next time event.
     /// False: the run has ended.
     [[nodiscard]] bool take_step(double remaining);
+
+    /// Notes whether the step that has been taken ends at a change that its stepper has located.
+    void note_change() noexcept { change_due_ = phases_ && step_.ends_at_change(); }
 
     /// Limits the next step to the length that its method allows.
     [[gnu::noinline]] void limit_to_reach();
@@ -546,6 +558,13 @@ private:
     [[nodiscard]] bool ends_at_release() const noexcept { return step_.h() == release_at_; }
     /// Accepts it, and lets that go free.
     void pass_to_release();
+    // --- phases ---
+
+    /// Lets the phases change after a step, or where the run would end.
+    [[gnu::noinline]] void review_phase(bool has_advanced);
+    /// Goes on from here in another phase: not a start, so that guards keep their sides.
+    /// @param h  as in `PhaseVerdict`
+    void continue_from(const X& x, Mode mode, double h);
 
     // --- events ---
 
@@ -592,7 +611,8 @@ private:
     void record_step(double s)
     {
         if (options_.record_steps && s > 0) {
-            run_.solution.add(step_.time(0), backward_, step_.mode(), step_.dense(), s);
+            run_.solution.add(step_.time(0), backward_, this->shown(step_.mode()), step_.dense(),
+                              s);
         }
     }
     /// The part of the step before a set at time t, at whose end is x⁻.
@@ -644,6 +664,8 @@ private:
     /// What ended the run, if it has ended.
     template <class Visitor>
     void visit_cause(Visitor&& visit);
+    template <class Visitor>
+    void visit_phases(Visitor&& visit);
     /// Lets a run continue that ended because it was cancelled, at an end before that of the
     /// options, at a limit on its steps that is not reached here, or stalled.
     void reopen() noexcept;

@@ -61,6 +61,7 @@ inline bool Loop<X, single>::return_to_domain()
         is_last_ = time_event_due_ = false;
         h_next_ = error_controlled_ ? h : h_next_;
         step_.attempt(h);
+        note_change();
         this->sample_end();
     }
 }
@@ -83,6 +84,7 @@ bool Loop<X, single>::smooth_step()
         ++run_.statistics.rejected;
         is_last_ = time_event_due_ = false;
         if (!take_controlled_step(h, h)) return false;
+        note_change();
         this->sample_end();
         if (bank_.first_not_finite() != no_guard) return return_to_domain();
         if (!this->any_suspicious()) return true;

@@ -48,7 +48,7 @@ inline void Loop<X, single>::record_place(double length)
     X zero = step_.x0();
     for_each_component(zero, [&](auto i) { zero[i] = 0; });
     const DenseParts<X> parts{.h = length, .x0 = &step_.x0(), .remainder = &zero, .rate0 = &zero};
-    run_.solution.add(step_.time(0), backward_, step_.mode(), parts, length);
+    run_.solution.add(step_.time(0), backward_, this->shown(step_.mode()), parts, length);
 }
 
 template <class X, bool single>
@@ -56,8 +56,8 @@ void Loop<X, single>::record_restart()
 {
     if (!options_.record_steps || run_.solution.empty()) return;
     const double t = step_.start().value;
-    const bool complete =
-        same_state(run_.solution(t), step_.x0()) && run_.solution.mode(t) == step_.mode();
+    const bool complete = same_state(run_.solution(t), step_.x0()) &&
+                          run_.solution.mode(t) == this->shown(step_.mode());
     if (!complete) record_place(0);
 }
 
@@ -66,7 +66,7 @@ inline void Loop<X, single>::add_sample(X&& x)
 {
     run_.trajectory.t.push_back(options_.sample_times[next_sample_]);
     run_.trajectory.x.push_back(std::move(x));
-    sample_mode_ = step_.mode();
+    sample_mode_ = this->shown(step_.mode());
     ++next_sample_;
 }
 

@@ -38,7 +38,14 @@ void Loop<X, single>::start_at(double t, const X& x, Mode mode)
         planner_->forget_wrong();
     }
     this->passed_ = std::numeric_limits<double>::quiet_NaN();
-    step_.restart(Instant{t, 0}, x, mode);
+    change_due_ = on_change_ = false;
+    if (phases_) {
+        X start = x;
+        mode = phases_->enter(system_.door(), mode, t, start);
+        step_.restart(Instant{t, 0}, start, mode);
+    } else {
+        step_.restart(Instant{t, 0}, x, mode);
+    }
     if (!step_.flow_fits()) throw_flow_does_not_fit("restart", static_cast<std::size_t>(x.size()));
     if (error_controlled_ && options_.step == 0) {
         h_next_ = initial_step(step_, options_, step_.until(options_.t_end));
@@ -60,6 +67,7 @@ void Loop<X, single>::start_at(double t, const X& x, Mode mode)
         this->arm_at_start(false);
     }
     if (guarded_ || timed_) this->settle_all();
+    if (phases_) review_phase(false);
 }
 
 template <class X, bool single>

@@ -13,8 +13,11 @@ template <class X, bool single>
 void Loop<X, single>::advance_resumably(const Advance& how)
 {
     mark_step();
+    if (phases_) mark_phases();
+    const std::uint64_t steps = run_.statistics.steps;
     try {
         advance_from_here(how);
+        if (phases_) review_phase(run_.statistics.steps != steps);
     } catch (...) {
         go_back_to_mark();
         throw;
@@ -52,6 +55,14 @@ inline void Loop<X, single>::mark_step() noexcept
     mark_->tentative = defers_ ? planner_->steps().size() : 0;
     mark_->planned = defers_ && !watching_;
     mark_->newly_armed = newly_armed_;
+}
+
+/// The phases decide after the step, too, so that everything is kept at its start.
+template <class X, bool single>
+void Loop<X, single>::mark_phases()
+{
+    mark_everything();
+    phases_->save(system_.door(), mark_->phases);
 }
 
 template <class X, bool single>
@@ -117,6 +128,7 @@ void Loop<X, single>::go_back_to_mark()
         step_.put_back_rate();
     }
     h_next_ = mark.h_next;
+    if (phases_) phases_->restore(system_.door(), mark.phases);
     newly_armed_ = mark.newly_armed;
     if (mark.tentative > 0) {
         const auto& first = planner_->steps()[0];
@@ -148,7 +160,7 @@ void Loop<X, single>::go_back_to_mark()
     next_sample_ = mark.next_sample;
     ended_ = false;
     pending_ = Engine::Pending::nothing;
-    due_here_ = false;
+    due_here_ = change_due_ = on_change_ = false;
     this->listed_at_ = Engine::stale;
     if (guarded_) {
         search_.fired().clear();

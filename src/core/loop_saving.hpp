@@ -43,7 +43,7 @@ inline void Loop<X, single>::go_on_from_place()
     this->resume_holds();
     step_.restart(place_);
     next_review_ = 0;
-    watching_ = replans_ = due_here_ = false;
+    watching_ = replans_ = due_here_ = change_due_ = on_change_ = false;
     this->listed_at_ = Engine::stale;
     if (guarded_) search_.begin(step_.x0());
     if (defers_) planner_->restore(bank_);
@@ -70,10 +70,23 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
     visit_cause(visit);
     visit_samples(visit);
     this->visit_guards(visit);
+    if (phases_) visit_phases(visit);
     if (defers_) {
         visit(last_h_);
         visit(newly_armed_);
         planner_->visit(visit);
+    }
+}
+
+template <class X, bool single>
+template <class Visitor>
+void Loop<X, single>::visit_phases(Visitor&& visit)
+{
+    std::vector<double> memory;
+    phases_->save(system_.door(), memory);
+    for (double& number : memory) visit(number);
+    if constexpr (!std::remove_cvref_t<Visitor>::saves) {
+        phases_->restore(system_.door(), memory);
     }
 }
 

@@ -27,7 +27,7 @@ inline const Options& Loop<X, single>::checked(const RunSetup<X>& setup, const O
 template <class X, bool single>
 inline std::vector<RunProperty> Loop<X, single>::properties() const
 {
-    const int order = setup_.method_by_name ? step_.order() : setup_.order;
+    const int order = setup_.method_by_name ? setup_.kernel->order : setup_.order;
     const std::string of_order = order > 0 ? " of order " + std::to_string(order) : "";
     return properties_of_run({.system = system_->name(system_.door()),
                               .stepping = plain_type_name(setup_.stepping) + of_order,

@@ -70,7 +70,7 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
 {
     run_.t = step_.start().value;
     run_.x = step_.x0();
-    run_.mode = step_.mode();
+    run_.mode = this->shown(step_.mode());
     this->collect_counts();
     this->list_armed_beyond();
     if (ended_) {
@@ -175,7 +175,9 @@ inline bool Loop<X, single>::take_step(double remaining)
     const double h = to_the_end ? longest : h_next_;
     step_.pin(to_the_end ? h : std::numeric_limits<double>::quiet_NaN(),
               is_last_ ? options_.t_end : time_event_);
-    return error_controlled_ ? take_controlled_step(h, h_next_) : take_fixed_step(h);
+    const bool taken = error_controlled_ ? take_controlled_step(h, h_next_) : take_fixed_step(h);
+    note_change();
+    return taken;
 }
 
 template <class X, bool single>

@@ -122,6 +122,8 @@ public:
     [[nodiscard]] const X& after() const noexcept { return after_; }
     [[nodiscard]] X& scratch() noexcept { return single_; }
     [[nodiscard]] Mode mode() const noexcept { return mode_; }
+    /// Sets the mode after the set.
+    void move_to(Mode mode) noexcept { mode_ = mode; }
 
     /// The two guards whose resets disagree, or a guard and `time_event_reset`; `no_guard` if none
     /// disagree.

@@ -18,6 +18,7 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/detail/instant.hpp"
+#include "ricochet/detail/phase_table.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/detail/system_table.hpp"
 #include "ricochet/integrate/options.hpp"
@@ -41,6 +42,7 @@ public:
           system_(system),
           own_kernel_(&kernel),
           kernel_(&kernel),
+          stepping_(system.door()),
           state_(x),
           kept_rate_(state_.zero),
           unused_rate_(state_.zero),
@@ -52,6 +54,7 @@ public:
         state_.start = {options.t_start, 0};
         state_.mode = options.mode;
         state_.backward = options.t_end < options.t_start;
+        if (system->phases) change_stepper();
         forget_jumps();
         arrive();
     }
@@ -240,7 +243,7 @@ public:
     {
         count_restep();
         if (state_.host) return restep_on_host(s, x);
-        kernel_->depart(system_.door(), state_, s, x, unused_rate_);
+        kernel_->depart(stepping_, state_, s, x, unused_rate_);
         keep_departure(s, x);
         add_tangent(s, x);
     }
@@ -287,7 +290,7 @@ public:
     /// x(t0 + s) on a dense output of the method's own order, or by a step of its own.
     void sample(double s, const Sampling& by, X& x) const
     {
-        if (kernel_->sample && kernel_->sample(system_.door(), state_, s, by.rtol, by.atol, x)) {
+        if (kernel_->sample && kernel_->sample(stepping_, state_, s, by.rtol, by.atol, x)) {
             add_tangent(s, x);
         } else if (kernel_->interpolates() || by.on_polynomial) {
             interpolate(s, x);
@@ -304,7 +307,7 @@ public:
             restep_on_host(s, x);
             return rate_on_host(s, dxdt);
         }
-        kernel_->depart(system_.door(), state_, s, x, dxdt);
+        kernel_->depart(stepping_, state_, s, x, dxdt);
         keep_departure(s, x);
         add_tangent(s, x);
         if (kernel_->end_rate) {
@@ -357,9 +360,14 @@ public:
         held_.door = free_.door();
         held_.components.assign(components.begin(), components.end());
         system_ = any ? SystemAt<X>(HeldFlow<X>::table, &held_, free_.span()) : free_;
-        state_.flow = system_->flow;
         const StepKernel<X>* const before = kernel_;
-        kernel_ = any ? &kernel_by_pointer(*own_kernel_, state_.x0.size()) : own_kernel_;
+        if (!any && system_->phases) {
+            change_stepper();
+        } else {
+            state_.flow = system_->flow;
+            stepping_ = system_.door();
+            kernel_ = any ? &kernel_by_pointer(*own_kernel_, state_.x0.size()) : own_kernel_;
+        }
         if (kernel_ != before && kernel_->renew) kernel_->renew(free_.door());
         held_.stop(state_.rate0);
     }
@@ -487,13 +495,13 @@ public:
 
     /// Takes a step of length h, without a check of its error. False if the end of the step or the
     /// flow there is not finite.
-    bool attempt(double h) { return kernel_->take(system_.door(), state_, h); }
+    bool attempt(double h) { return kernel_->take(stepping_, state_, h); }
 
     /// Takes a step of length h and returns the largest ratio of its estimated error to
     /// atol + rtol max(|x0|, |x1|); NaN if anything is not finite.
     [[nodiscard]] double attempt(double h, double rtol, double atol)
     {
-        return kernel_->attempt(system_.door(), state_, h, rtol, atol);
+        return kernel_->attempt(stepping_, state_, h, rtol, atol);
     }
 
     /// Whether the polynomial of the step may be less accurate than its end, and by how much: see
@@ -501,20 +509,20 @@ public:
     [[nodiscard]] bool may_be_rough() const noexcept { return kernel_->roughness; }
     [[nodiscard]] double roughness(double rtol, double atol) const
     {
-        return kernel_->roughness(system_.door(), state_, rtol, atol);
+        return kernel_->roughness(stepping_, state_, rtol, atol);
     }
 
     /// Whether guards have power series over the step.
     [[nodiscard]] bool has_guard_series() const noexcept { return kernel_->guard_series; }
     [[nodiscard]] SeriesTerms guard_series() const
     {
-        return kernel_->guard_series(system_.door(), state_);
+        return kernel_->guard_series(stepping_, state_);
     }
 
     /// See `StepKernel::cross`. @param before  receives the state at the root
     [[nodiscard]] bool cross(SeriesCrossing& crossing, X& before) const
     {
-        if (!kernel_->cross(system_.door(), state_, crossing)) return false;
+        if (!kernel_->cross(stepping_, state_, crossing)) return false;
         assign(before, state_.at);
         return true;
     }
@@ -524,7 +532,13 @@ public:
     /// Length [s] of the step, if it is known in advance.
     [[nodiscard]] double reach(double rtol, double atol)
     {
-        return kernel_->reach(system_.door(), state_, rtol, atol);
+        return kernel_->reach(stepping_, state_, rtol, atol);
+    }
+
+    /// Whether the step ends at a change that its stepper has located.
+    [[nodiscard]] bool ends_at_change() const
+    {
+        return kernel_->ends_at_change && kernel_->ends_at_change(stepping_, state_);
     }
 
     /// Makes the end of the step the start of the next.
@@ -741,7 +755,10 @@ private:
     void begin(const X& x, Mode mode)
     {
         unpin();
+        const bool changes_phase = system_->phases && mode != state_.mode;
         state_.mode = mode;
+        if (changes_phase) [[unlikely]]
+            change_stepper();
         if (x.size() != state_.x0.size()) resize(x);
         assign(state_.x0, x);
         assign(state_.remainder, state_.zero);
@@ -749,6 +766,15 @@ private:
         state_.asked_alone = 0;
         forget_jumps();
         departed_ = std::numeric_limits<double>::quiet_NaN();
+    }
+
+    /// Steps are taken by the stepper of the mode from here on.
+    [[gnu::cold, gnu::noinline]] void change_stepper()
+    {
+        const Stepper<X> stepper = system_->phases->stepper(system_.door(), state_.mode);
+        kernel_ = stepper.kernel;
+        stepping_ = stepper.door;
+        state_.flow = stepper.flow;
     }
 
     void resize(const X& x)
@@ -765,7 +791,7 @@ private:
         unused_rate_ = end_slope_ = kept_rate_ = departure_ = state_.zero;
         inner_w_.fill(state_.zero);
         inner_rate_.fill(state_.zero);
-        if (kernel_->renew) kernel_->renew(system_.door());
+        if (kernel_->renew) kernel_->renew(stepping_);
     }
 
     void place_tolerances()
@@ -782,7 +808,7 @@ private:
                 .x0 = &state_.x0,
                 .remainder = &state_.remainder,
                 .rate0 = &state_.rate0,
-                .series = kernel_->series(system_.door(), state_)};
+                .series = kernel_->series(stepping_, state_)};
     }
 
     /// w(s) on the method's own interpolant.
@@ -791,7 +817,7 @@ private:
         if (kernel_->is_dopri5) {
             Dopri5::dense(s, state_.h, state_.stages.data(), state_.w_rate1, w);
         } else {
-            kernel_->departure(system_.door(), state_, s, w);
+            kernel_->departure(stepping_, state_, s, w);
         }
     }
 
@@ -814,7 +840,7 @@ private:
     /// An inner node, computed by a step of its own.
     void prepare_node(double s, X& w, X& slope) const
     {
-        kernel_->depart(system_.door(), state_, s, w, unused_rate_);
+        kernel_->depart(stepping_, state_, s, w, unused_rate_);
         X& at = state_.at;
         assign(at, w);
         add_tangent(s, at);
@@ -839,6 +865,7 @@ private:
     const StepKernel<X>* own_kernel_;
     const StepKernel<X>* kernel_;
     HeldFlow<X> held_;
+    void* stepping_;  ///< first argument of the kernel's functions
     mutable StepState<X> state_;
     std::vector<double> component_atol_;
     double atol_ = 0;

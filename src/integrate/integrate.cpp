@@ -62,8 +62,8 @@ void throw_unknown_mode(std::string_view who, std::size_t mode, std::size_t mode
         throw StartRefused(
             fmt::format("{}: mode must be 0, the only one of the system, got {}", who, mode));
     }
-    throw StartRefused(fmt::format(
-        "{}: mode must be below the system's mode_count = {}, got {}", who, modes, mode));
+    throw StartRefused(fmt::format("{}: mode must be below the system's mode_count = {}, got {}",
+                                   who, modes, mode));
 }
 
 void throw_flow_does_not_fit(std::string_view who, std::size_t components)
@@ -169,8 +169,8 @@ void throw_start_outside_mode(std::string_view who, std::size_t which, std::stri
 void throw_start_guard_not_finite(std::string_view who, std::size_t which, std::string_view name,
                                   double t, double guard)
 {
-    throw StartRefused(fmt::format("{}: {} must be finite at the start, got {} at t = {}",
-                                            who, guard_called(which, name), guard, t));
+    throw StartRefused(fmt::format("{}: {} must be finite at the start, got {} at t = {}", who,
+                                   guard_called(which, name), guard, t));
 }
 
 template void update(Run<std::array<double, 1>>&, const Run<SmallState>&,

@@ -79,7 +79,8 @@ template <class X>
             .bracket = event.bracket,
             .slope = event.slope,
             .error = event.error,
-            .late = event.late};
+            .late = event.late,
+            .reaction = event.reaction};
 }
 
 /// Argument of the functions of the table: the system, and memory for states of its own type.

@@ -150,6 +150,9 @@ struct StepKernel {
     /// The length of the step from here that meets the tolerance; then `attempt` with at most that
     /// length returns 0. Null where a length is known to be right only afterwards.
     double (*reach)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
+    /// Whether the current step ends at a change that the stepper has located by itself. Null where
+    /// it locates none.
+    bool (*ends_at_change)(void* door, const StepState<X>& step) = nullptr;
     /// w(s) on an interpolant of the method's own, or null.
     void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;
     /// w(s) for a sample, on an interpolant of the order of the method that takes further work

@@ -36,6 +36,9 @@ struct ScaledTime {
 };
 
 template <class X>
+struct PhaseTable;
+
+template <class X>
 struct SystemTable {
     using Door = void*;
     using View = PolynomialView<X, false>;
@@ -99,6 +102,9 @@ struct SystemTable {
     double (*acceleration_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
     double (*lower_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
     double (*upper_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
+
+    /// Null: the motion is that of the flow throughout.
+    const PhaseTable<X>* phases = nullptr;
 
     [[nodiscard]] bool resets() const noexcept { return reset || reset_set; }
     [[nodiscard]] bool timed() const noexcept { return next_time_event || next_time_event_at; }

@@ -126,6 +126,9 @@ enum class EventKind : std::uint8_t {
 /// `Event::guard` of an event without a guard.
 inline constexpr std::size_t no_guard = static_cast<std::size_t>(-1);
 
+/// `Event::reaction` of an event that changes no reaction.
+inline constexpr std::size_t no_reaction = static_cast<std::size_t>(-1);
+
 /// `Run::other_guard` where the reset of a time event contradicts that of a guard.
 inline constexpr std::size_t time_event_reset = static_cast<std::size_t>(-2);
 
@@ -156,6 +159,8 @@ struct Event {
     double slope = 0;   ///< rate of the guard at the event, per second; NaN if not computed
     double error = 0;   ///< [s] error of location within the step, not of the solution
     bool late = false;  ///< found at a step after the one that held it
+    /// The reaction of a stick, a slip or a mode of a system with set_valued(), else `no_reaction`.
+    std::size_t reaction = no_reaction;
 };
 
 // The scalar of a system's functions as a template parameter.

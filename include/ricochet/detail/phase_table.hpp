@@ -1,0 +1,113 @@
+// Internal: the declarations of this header may change without notice.
+//
+// Phases of a run whose motion is not always that of the system's flow, as a table of pointers.
+//
+// A mode of such a run is a mode of the system and, in the bits above it, the kind of phase: kind 0
+// is the system's own flow. Who takes the steps depends on the mode; a step may end at a change
+// that its stepper has located by itself; after the resets of every set the phases decide how the
+// motion goes on. Everything else is the loop's. Functions take the door of the system's table.
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "ricochet/detail/step_state.hpp"
+#include "ricochet/integrate/run.hpp"
+
+namespace ricochet::detail {
+
+/// Modes of the system lie below this.
+inline constexpr Mode own_modes = Mode{1} << 24;
+
+/// The mode of the system, without the kind of phase.
+[[nodiscard]] constexpr Mode own_mode(Mode mode) noexcept
+{
+    return mode & (own_modes - 1);
+}
+
+/// What takes the steps in a mode.
+template <class X>
+struct Stepper {
+    const StepKernel<X>* kernel = nullptr;
+    void* door = nullptr;  ///< first argument of the kernel's functions
+    /// Flow for kernels that call it by pointer, with that door.
+    bool (*flow)(void* door, Mode mode, double t, const X& x, X& dxdt) = nullptr;
+};
+
+/// What has happened at one instant, before the phases decide.
+template <class X>
+struct PhaseSet {
+    std::span<const std::size_t> fired;
+    bool on_time;    ///< with a time event
+    bool on_change;  ///< at the change that the stepper has located
+    double t;
+    Mode before, after;  ///< the modes before and after the resets of the system
+    const X& x;          ///< x⁻
+};
+
+/// A change of a reaction at the last set.
+struct ReactionChange {
+    std::size_t reaction = 0;
+    EventKind kind = EventKind::mode;
+    std::size_t fired = no_guard;  ///< guard of the phases by which it was located, or `no_guard`
+    std::size_t guard = no_guard;  ///< guard of the system under which it is recorded
+};
+
+/// Where the run is after a step, with all events in it.
+template <class X>
+struct PhaseStep {
+    double t;
+    Mode mode;
+    const X& x;
+    const X& rate;      ///< the flow there
+    double h_next;      ///< [s] length of the next step
+    bool has_advanced;  ///< false: a set, or another change of phase, at the same instant
+};
+
+/// How a run has ended.
+template <class X>
+struct PhaseEnd {
+    Outcome outcome;
+    std::size_t guard;
+    double t;
+    Mode mode;
+    const X& x;
+};
+
+/// How the motion goes on.
+struct PhaseVerdict {
+    enum class Kind { stands, changes, ends };
+    Kind kind = Kind::stands;
+    Mode mode = 0;  ///< of a change
+    double h = 0;   ///< [s] length of the next step; 0: as at a start; negative: as it was
+    Outcome outcome = Outcome::reached_end;  ///< of an end
+};
+
+template <class X>
+struct PhaseTable {
+    using Door = void*;
+
+    /// The number of guards of the system. Those behind them belong to the phases: their crossings
+    /// cut steps, and are no events by themselves.
+    std::size_t (*own_guards)(Door) = nullptr;
+    Stepper<X> (*stepper)(Door, Mode) = nullptr;
+    /// The mode in which a run starts at (t, x) in a mode of the system. May move x onto a surface.
+    Mode (*enter)(Door, Mode, double t, X& x) = nullptr;
+    /// The mode after a set. May move x⁺ onto a surface.
+    Mode (*decide)(Door, const PhaseSet<X>&, X& after) = nullptr;
+    /// Changes of reactions at the last set, by reaction.
+    std::span<const ReactionChange> (*changes)(Door) = nullptr;
+    /// Whether the last set has an event of its own for a guard of the system: not for one that
+    /// stands for a reaction whose change is recorded under another guard.
+    bool (*records)(Door, std::size_t guard) = nullptr;
+    /// The phase after a step. May move x onto a surface.
+    PhaseVerdict (*review)(Door, const PhaseStep<X>&, X& x) = nullptr;
+    /// The phase where the run would end. May move x onto a surface.
+    PhaseVerdict (*give_up)(Door, const PhaseEnd<X>&, X& x) = nullptr;
+    /// The numbers besides time, mode and state on which the future of the run depends.
+    void (*save)(Door, std::vector<double>& memory) = nullptr;
+    void (*restore)(Door, const std::vector<double>& memory) = nullptr;
+};
+
+}  // namespace ricochet::detail

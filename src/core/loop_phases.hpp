@@ -1,0 +1,58 @@
+// Changes of phase between the steps of the loop.
+#pragma once
+
+#include "core/loop.hpp"
+
+namespace ricochet::detail {
+
+template <class X, bool single>
+void Loop<X, single>::review_phase(bool has_advanced)
+{
+    // A phase that ends at once may be followed by another one, which ends at once.
+    constexpr int most = 8;
+    for (int i = 0; i < most; ++i, has_advanced = false) {
+        X x = step_.x0();
+        const double t = step_.start().value;
+        const PhaseVerdict verdict =
+            ended_ ? phases_->give_up(system_.door(),
+                                      {run_.outcome, run_.guard, t, step_.mode(), step_.x0()}, x)
+                   : phases_->review(
+                         system_.door(),
+                         {t, step_.mode(), step_.x0(), step_.rate0(), h_next_, has_advanced}, x);
+        if (verdict.kind == PhaseVerdict::Kind::stands) break;
+        if (verdict.kind == PhaseVerdict::Kind::ends) {
+            end(verdict.outcome);
+            break;
+        }
+        continue_from(x, verdict.mode, verdict.h);
+    }
+    if (this->is_of_phases(run_.guard)) run_.guard = no_guard;
+    if (this->is_of_phases(run_.other_guard)) run_.other_guard = no_guard;
+}
+
+template <class X, bool single>
+void Loop<X, single>::continue_from(const X& x, Mode mode, double h)
+{
+    ended_ = resting_ = this->stops_ = false;
+    run_.outcome = Outcome::reached_end;
+    this->forget_cause();
+    search_.fired().clear();
+    this->leave_from_start();
+    assign(search_.before(), step_.x0());
+    this->mode_before_ = step_.mode();
+    this->changed_mode_ = mode != step_.mode();
+    this->enters_mode_ = this->shown(mode) != this->shown(step_.mode());
+    this->leaves_phase_ = true;
+    on_time_ = this->located_ = on_change_ = change_due_ = false;
+    const X from = step_.x0(), remainder = step_.remainder();
+    step_.restart(step_.start(), x, mode);
+    for (std::size_t c = 0; c < static_cast<std::size_t>(from.size()); ++c) {
+        if (from[c] == x[c]) step_.set_remainder(c, remainder[c]);
+    }
+    if (h == 0) h = initial_step(step_, options_, step_.until(options_.t_end));
+    if (h > 0) h_next_ = std::min(h, options_.h_max);
+    pending_ = Engine::Pending::settle;
+    settle_and_record();
+}
+
+}  // namespace ricochet::detail
