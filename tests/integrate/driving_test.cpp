@@ -365,7 +365,7 @@ TEST(Driving, ARunThatEndedAtALimitGoesOnFromItsSnapshotWhenMoreIsAllowed)
 TEST(Driving, AStalledRunGoesOnFromItsSnapshot)
 {
     const Oscillator system{};
-    const Options stalls{.t_end = 1e13, .h_max = 0.01, .stall_steps = 100};
+    const Options stalls{.t_end = 1e13, .h_max = 0.01, .stall_steps = 2};
     Simulation stalled(system, Two{1, 0}, stalls);
     while (stalled.step()) {
     }
