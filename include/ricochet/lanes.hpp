@@ -81,6 +81,7 @@ private:
 /// @tparam wide  as for `TaylorLanes`
 template <class System, class X, bool wide, class SystemOf, class Detector, class Locator>
 class LaneRuns {
+    static_assert(has_flow_alone<System>());
     using Stepping = ErrorControlled<Taylor>;
     using Parts = PartsOfRun<System, X, Stepping, Detector, Locator>;
     using C = CoreState<X>;

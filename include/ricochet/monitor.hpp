@@ -229,6 +229,7 @@ template <class System, class X = detail::DeclaredState<System>, class Detector 
           class Locator = Newton>
 class EventMonitor {
     static_assert(detail::check_system<System, X>());
+    static_assert(detail::has_flow_alone<System>());
 
 public:
     /// Type of the states of `cut` and `events`: contiguous doubles.

@@ -18,6 +18,7 @@ std::string_view name(PhaseCause cause) noexcept
         case PhaseCause::stuck: return "stuck";
         case PhaseCause::contradiction: return "contradiction";
         case PhaseCause::released: return "released";
+        case PhaseCause::held: return "held";
     }
     return "unknown";
 }

@@ -346,7 +346,7 @@ private:
     {
         Event<Vector> event;
         event.t = from.t;
-        event.guard = from.guard / 4;
+        event.guard = event.reaction = from.guard / 4;
         event.mode_before = from.mode_before;
         event.mode_after = from.mode_after;
         event.before = Modes::vector(from.before);
@@ -516,7 +516,7 @@ private:
         Event<Vector> event;
         event.t = now.t;
         event.kind = kind_of(change.before == Branch::inside, change.after == Branch::inside);
-        event.guard = change.reaction;
+        event.guard = event.reaction = change.reaction;
         event.before = event.after = now.w;
         event.bracket = {now.t, now.t};
         event.slope = std::numeric_limits<double>::quiet_NaN();

@@ -192,6 +192,14 @@ public:
     /// of at most `error` whose reaction is inside its bounds counts as zero, too.
     [[nodiscard]] Mode mode_after(StateWithReaction<N, M>& end, double error) const;
 
+    /// The mode of the motion where the y of the reactions marked inside are zero; they are set to
+    /// zero. `several` where the rates do not decide, `empty` where bounds form no interval.
+    [[nodiscard]] Mode arrive(const Branches& at, double t, Vector& w) const
+    {
+        hold(at, t, w);
+        return faulty(t, w) >= 0 ? empty : settle(at, t, w);
+    }
+
     /// The branches that follow from the signs of y; inside where y is zero up to rounding.
     [[nodiscard]] Branches zero_branches(double t, const Vector& w) const;
 

@@ -575,6 +575,18 @@ struct NearNamesOf {
     static constexpr bool checked = true;
 };
 
+/// Rejects a system with set_valued() where its inclusion would be ignored.
+template <class System>
+constexpr bool has_flow_alone()
+{
+    static_assert(
+        !requires(const System& system) { system.set_valued(); },
+        "ricochet: found a system with set_valued(); expected the target to link "
+        "ricochet::nonsmooth, ricochet/nonsmooth/hand_over.hpp to be included, and a "
+        "call of integrate or Simulation, which alone follow an inclusion");
+    return true;
+}
+
 /// Refuses what does not fit, with a sentence for each. Returns true, so that a static_assert
 /// makes the compiler evaluate this check before any other.
 template <class System, class X>

@@ -27,6 +27,7 @@ enum class PhaseCause {
     stuck,          ///< the event-driven loop could not continue
     contradiction,  ///< an event-driven step contradicted the law of a reaction
     released,       ///< event-driven again: every branch is plain
+    held,           ///< a y arrived at zero, and its reaction holds it
 };
 
 /// The enumerator's name.
@@ -104,6 +105,10 @@ struct HandOverRun : detail::AnyHandOverRun<state_size<System>, reaction_size<Sy
 [[nodiscard]] HandOverOptions hand_over_options(const Options& options);
 
 namespace detail {
+
+/// The same for a run in phases of one loop, which has stop_at_event, record_steps and tolerances
+/// of components.
+[[nodiscard]] HandOverOptions options_of_phases(const Options& options);
 
 /// The same for a run of an inclusion alone.
 /// @throws std::invalid_argument also for options that it does not use

@@ -71,6 +71,18 @@ public:
     /// Whether a reaction was beyond its bound at the start of the last step already.
     [[nodiscard]] bool starts_beyond() const noexcept { return starts_beyond_; }
 
+    /// Ratio of the last step's error to the one that is allowed.
+    [[nodiscard]] double worst() const noexcept { return worst_; }
+
+    /// Goes on as after a step of length h that has ended at (t, w) in a mode.
+    void resume(const Modes& modes, Mode mode, double t, const Vector& w, double h, double worst)
+    {
+        end_.mode = mode;
+        evaluate(modes, t, w, -h, end_);
+        length_ = h;
+        worst_ = worst;
+    }
+
     void forget() noexcept
     {
         end_.t = std::numeric_limits<double>::quiet_NaN();

@@ -42,7 +42,10 @@
                                            const ricochet::HandOverOptions&,                   \
                                            const ricochet::detail::EventStepping<N, M>&);      \
     template ricochet::detail::AnyHandOverRun<N, M> ricochet::detail::take_run<N, M>(          \
-        ricochet::detail::AnyHandOver<N, M>&);
+        ricochet::detail::AnyHandOver<N, M>&);                                                 \
+    template ricochet::detail::Owner<ricochet::detail::BranchPhases>                           \
+    ricochet::detail::make_branch_phases<N, M>(const ricochet::detail::AnyInclusion<N, M>&,    \
+                                               const ricochet::detail::BranchPhasesOptions&);
 
 /// The simulation of the modes of at most four reactions, by Dormand and Prince's method, or by
 /// another one with error control.

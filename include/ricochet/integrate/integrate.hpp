@@ -6,18 +6,6 @@
 
 namespace ricochet {
 
-namespace detail {
-
-/// Whether a system declares an inclusion, which only the `integrate` of nonsmooth/hand_over.hpp
-/// takes.
-template <class System>
-concept WantsHandOver = requires(const System& system)
-{
-    system.set_valued();
-};
-
-}  // namespace detail
-
 /// Integrates `system` from x0 at `options.t_start` to `options.t_end`.
 ///
 /// @param system   declares its functions (see hybrid/system.hpp); not copied, not
@@ -38,10 +26,7 @@ requires Flowing<System, X> && StateVector<X>
                                const Stepping& stepping = {}, const Detector& detector = {},
                                const Locator& locator = {})
 {
-    static_assert(!detail::WantsHandOver<System>,
-                  "ricochet: found a system with set_valued(); expected the target to link "
-                  "ricochet::nonsmooth, and ricochet/nonsmooth/hand_over.hpp to be included, "
-                  "which hands it over");
+    static_assert(detail::has_flow_alone<System>());
     detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
                                                                      locator);
     return detail::run_for_caller(parts.setup(), x0, options);

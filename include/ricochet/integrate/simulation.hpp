@@ -131,6 +131,13 @@ public:
     {
         return door_;
     }
+    /// The method's name; Dormand and Prince's for one without a name.
+    [[nodiscard]] MethodName method_name() const noexcept
+    {
+        if constexpr (by_name) return stepping_.value.name;
+        if constexpr (NameOf<Method>::known) return NameOf<Method>::name;
+        return MethodName::dopri5;
+    }
     [[nodiscard]] RunSetup<C> setup() noexcept
     {
         return {.system = &system_table<System, X>,
@@ -271,6 +278,24 @@ template <class X>
     }
 }
 
+/// The loop of a simulation. A system with set_valued() has another one (nonsmooth/hand_over.hpp).
+template <class System, class X, class Stepping, class Detector>
+class LoopOf {
+    static_assert(has_flow_alone<System>());
+
+public:
+    LoopOf() = default;
+    template <class Parts>
+    LoopOf(const System& /*system*/, Parts& parts, const X& x0, const Options& options)
+        : loop_(make_loop(parts.setup(), core_state(x0), options))
+    {
+    }
+    [[nodiscard]] AnyLoop<CoreState<X>>* operator->() const noexcept { return &*loop_; }
+
+private:
+    Owner<AnyLoop<CoreState<X>>> loop_;
+};
+
 }  // namespace detail
 
 /// A run that the caller drives, from (t_start, x0) to t_end.
@@ -328,7 +353,7 @@ public:
                const Stepping& stepping = {}, const Detector& detector = {},
                const Locator& locator = {})
         : parts_(new Parts(system, x0, stepping, detector, locator)),
-          loop_(detail::make_loop(parts_->setup(), detail::core_state(x0), options)),
+          loop_(system, *parts_, x0, options),
           shown_(x0)
     {
     }
@@ -515,7 +540,7 @@ private:
 
     detail::Owner<const System> own_;  ///< where it was a temporary
     detail::Owner<Parts> parts_;
-    detail::Owner<detail::AnyLoop<C>> loop_;
+    detail::LoopOf<System, X, Stepping, Detector> loop_;
     mutable Shown shown_;
 };
 

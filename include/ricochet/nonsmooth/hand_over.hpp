@@ -24,6 +24,7 @@
 #include "ricochet/detail/hand_over_watches.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/padded_run.hpp"
+#include "ricochet/detail/phased_run.hpp"
 #include "ricochet/detail/refusals.hpp"
 #include "ricochet/detail/refused_calls.hpp"
 #include "ricochet/integrate/integrate.hpp"
@@ -122,18 +123,19 @@ namespace ricochet {
 //     set_valued()         an Inclusion (inclusion.hpp) of the same state
 //     start_mode(t, x)     if it has modes: the mode in which it continues from (t, x)
 //
-// `integrate` then follows its events as long as that is possible. Where it is not (switchings that
-// accumulate or chatter, a motion that presses on its guard, resets that contradict one another)
-// the inclusion takes over, as above, and hands back when none of its reactions is held
-// any more.
+// The loop then follows the system's own flow while every y is clear of zero, farther from it than
+// 1000 (atol + rtol |w|) over the components that y reads, and the inclusion elsewhere: at the
+// start, after every set of events, and where a y arrives at zero. All guards, resets and time
+// events of the system are watched in both. A guard that vanishes where a y does stands for that
+// reaction: its event is then a `stick`, a `mode` or a `touch` of the reaction. Where changes of
+// reactions accumulate, chatter or contradict one another, implicit steps are taken.
 //
-// The guard where a motion may come to rest must be `unilateral`, or of `either` direction and
-// without modes: only then does a motion that presses on its surface trigger an event again
-// immediately, by which the pressing is recognised. An edge-triggered guard lets that motion pass,
-// and the inclusion is never used.
-//
-// Time events of the system also happen while the inclusion is followed. Events resume after a time
-// reset that changes the state or the mode.
+// `integrate` and `Simulation` follow boxes of at most four reactions beside a state of a fixed
+// size in this way, by the methods of the library with error control. Other systems are followed by
+// `integrate` alone, in runs by events and by the inclusion, one after the other: the inclusion
+// takes over where switchings accumulate or chatter, where a motion presses on its guard, or where
+// resets contradict one another. Meanwhile guards are not evaluated, and the guard where the motion
+// may come to rest must be `unilateral`, or of `either` direction and without modes.
 //
 // Inclusions without events of their own are given to `integrate` directly.
 
@@ -143,8 +145,9 @@ concept KnowsInclusion = requires(const System& system)
     requires Inclusion<std::remove_cvref_t<decltype(system.set_valued())>>;
 };
 
-/// Result of a run. In event-driven phases `Event::guard` is a guard of the system; in set-valued
-/// phases it is the index of a reaction, and both modes of the event are the mode before the phase.
+/// Result of a run. A `stick`, `mode` or `touch` has the lowest guard that stands for the reaction
+/// among those that fired, or none, a `slip` has none, and `Event::reaction` is the reaction. Of a
+/// run in parts (see above) `Event::guard` is the index of the reaction.
 template <class X>
 struct MixedRun {
     Outcome outcome = Outcome::reached_end;
@@ -157,6 +160,7 @@ struct MixedRun {
     std::vector<Event<X>> events;
     std::vector<Phase> phases;
     Trajectory<X> trajectory;  ///< at the sample times
+    Solution<X> solution;      ///< with `Options::record_steps`
     HandOverStatistics statistics;
     StageReport failure;  ///< set with `not_converged`
 };
@@ -222,9 +226,7 @@ public:
           set_(system.set_valued()),
           options_(options),
           hand_over_(detail::completed(hand_over_options(options), false)),
-          stepping_(stepping),
-          detector_(detector),
-          locator_(locator)
+          parts_(system, x0, stepping, detector, locator)
     {
         static_assert(
             !Moded<System, X> || requires(Mode & mode) { mode = system.start_mode(0.0, x0); },
@@ -279,10 +281,9 @@ private:
         options.sample_times = remaining_samples();
         options.max_steps = options_.max_steps - steps_taken();
         options.record_events = true;  // the watches below review them
-        using Loop = Simulation<System, X, Stepping, Detector, Locator>;
-        std::optional<Loop> simulation;
+        detail::Owner<detail::AnyLoop<detail::CoreState<X>>> loop;
         try {
-            simulation.emplace(system_, run_.x, options, stepping_, detector_, locator_);
+            loop = detail::make_loop(parts_.setup(), detail::core_state(run_.x), options);
         } catch (const detail::StartRefused&) {
             if (run_.phases.size() == 1) throw;  // the start of the caller
             return PhaseCause::stuck;
@@ -290,12 +291,11 @@ private:
         detail::ChatterWatch watch(run_.t, hand_over_.set_valued.step / 100);
         detail::SwitchingWatch switches;
         bool chatters = false;
-        while (!chatters && simulation->step()) {
-            chatters =
-                watch(simulation->t(), simulation->run().statistics.events) ||
-                switches(simulation->run().events, [&] { return error_of(simulation->x()); });
+        while (!chatters && loop->step()) {
+            chatters = watch(loop->t(), loop->run().statistics.events) ||
+                       switches(loop->run().events, [&] { return error_of(loop->x()); });
         }
-        Run<X> done = simulation->finish();
+        Run<X> done = detail::as_callers<X>(loop->finish(), run_.x);
         run_.t = done.t;
         run_.x = done.x;
         run_.mode = done.mode;
@@ -458,7 +458,8 @@ private:
     }
 
     /// Error of a step that ends at state x.
-    [[nodiscard]] double error_of(const X& x) const
+    template <class State>
+    [[nodiscard]] double error_of(const State& x) const
     {
         double largest = 0;
         for (const double component : x) largest = std::max(largest, std::abs(component));
@@ -501,13 +502,112 @@ private:
     Set set_;
     Options options_;
     HandOverOptions hand_over_;
-    Stepping stepping_;
-    Detector detector_;
-    Locator locator_;
+    detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts_;
     MixedRun<X> run_;
 };
 
 namespace detail {
+
+/// Whether the loop follows the inclusion of a system: a box of at most four reactions beside a
+/// state of a fixed size, by one of the library's methods with error control, and a detector that
+/// checks every step.
+template <class System, class X, class Stepping, class Detector>
+[[nodiscard]] consteval bool runs_in_phases()
+{
+    if constexpr (KnowsInclusion<System>) {
+        using Set = std::remove_cvref_t<decltype(std::declval<const System&>().set_valued())>;
+        using Method = typename Stepping::method;
+        if constexpr (Branching<Set> && std::is_same_v<Stepping, ErrorControlled<Method>>) {
+            return static_cast<int>(fixed_size<X>()) == state_size<Set> &&
+                   (NameOf<Method>::known ||
+                    std::is_same_v<Method, MethodByName>)&&!DetectorTableOf<Detector, System,
+                                                                            X>::predicts &&
+                   !defers_checks<Detector, System, X>();
+        }
+    }
+    return false;
+}
+
+/// The loop of a system with set_valued().
+template <class System, class X, class Stepping, class Detector>
+requires(KnowsInclusion<System>) class LoopOf<System, X, Stepping, Detector> {
+    using C = CoreState<X>;
+    using Set = std::remove_cvref_t<decltype(std::declval<const System&>().set_valued())>;
+    static_assert(runs_in_phases<System, X, Stepping, Detector>(),
+                  "ricochet: found a Simulation of a system with set_valued() that the loop cannot "
+                  "follow; expected sets that are boxes of at most four reactions, a state of "
+                  "fixed size, ErrorControlled<Method> with a method of the library, and Extremum, "
+                  "Ends or Bernstein; or integrate");
+    static_assert(
+        !Moded<System, X> || requires(const System& system, Mode& mode,
+                                      const X& x) { mode = system.start_mode(0.0, x); },
+        "ricochet: found a system with modes and set_valued(); expected Mode "
+        "start_mode(double t, const State& x) const as well, the mode after it");
+
+public:
+    LoopOf() = default;
+    template <class Parts>
+    LoopOf(const System& system, Parts& parts, const X& x0, const Options& options)
+        : run_(make_phased_run<C>(setup(system, parts, options), core_state(x0), options))
+    {
+    }
+    [[nodiscard]] AnyLoop<C>* operator->() const noexcept { return &run_->loop(); }
+    [[nodiscard]] const PhasedRun<C>& phased() const noexcept { return *run_; }
+
+private:
+    template <class Parts>
+    [[nodiscard]] static PhasedSetup<C> setup(const System& system, Parts& parts,
+                                              const Options& options)
+    {
+        constexpr int N = solver_components<state_size<Set>, reaction_size<Set>>;
+        constexpr int M = solver_reactions<state_size<Set>, reaction_size<Set>>;
+        const HandOverOptions of = completed(options_of_phases(options), false);
+        PhasedSetup<C> out;
+        out.user = parts.setup();
+        out.inclusion = make_branch_phases<N, M>(solver_inclusion(Set(system.set_valued())),
+                                                 {.scheme = of.set_valued.scheme,
+                                                  .step = of.set_valued.step,
+                                                  .event_tolerance = of.event_tolerance});
+        out.method = parts.method_name();
+        if constexpr (Moded<System, X>) {
+            out.start_mode = [](void* door, double t, const C& x) -> Mode {
+                auto& of = *static_cast<Door<System, X>*>(door);
+                return of.system().start_mode(t, of.read(x, 0));
+            };
+        }
+        return out;
+    }
+
+    Owner<PhasedRun<C>> run_;
+};
+
+/// A whole run in phases.
+template <class System, class X, class Stepping, class Detector, class Locator>
+[[nodiscard]] MixedRun<X> run_in_phases(const System& system, const X& x0, const Options& options,
+                                        const Stepping& stepping, const Detector& detector,
+                                        const Locator& locator)
+{
+    PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
+                                                             locator);
+    const LoopOf<System, X, Stepping, Detector> loop(system, parts, x0, options);
+    Run<CoreState<X>> done = loop->take();
+    MixedRun<X> out;
+    out.phases = loop.phased().phases();
+    out.statistics = loop.phased().statistics(done);
+    if (done.outcome == Outcome::not_converged) out.failure = loop.phased().failure();
+    Run<X> run = as_callers<X>(std::move(done), x0);
+    out.outcome = run.outcome;
+    out.t = run.t;
+    out.x = run.x;
+    out.mode = run.mode;
+    out.guard = run.guard;
+    out.other_guard = run.other_guard;
+    out.reason = std::move(run.reason);
+    out.events = std::move(run.events);
+    out.trajectory = std::move(run.trajectory);
+    out.solution = std::move(run.solution);
+    return out;
+}
 
 /// Whether the library of inclusions is linked: its target defines RICOCHET_WITH_NONSMOOTH.
 template <class>
@@ -520,10 +620,11 @@ inline constexpr bool nonsmooth_is_linked =
 
 }  // namespace detail
 
-/// Integrates by events as far as possible, and by the inclusion where events cannot continue.
+/// Integrates a system with its inclusion.
 ///
-/// @throws std::invalid_argument as for other systems; also for `stop_at_event`, `record_steps`, a
-///         `stop_after` above 1 and a backward run, which a hand-over does not support.
+/// @throws std::invalid_argument as for other systems; also for a backward run and an infinite end,
+///         and for a start from which no reaction follows. In a run in parts (see above) also for
+///         `stop_at_event`, `record_steps` and a `stop_after` above 1.
 template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
@@ -534,9 +635,13 @@ requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
     static_assert(detail::nonsmooth_is_linked<System>,
                   "ricochet: found a system with set_valued(), and a target that does not link "
                   "ricochet::nonsmooth; expected it to, or RICOCHET_WITH_NONSMOOTH to be defined");
-    return EventHandOver<System, X, Stepping, Detector, Locator>(system, x0, options, stepping,
-                                                                 detector, locator)
-        .take();
+    if constexpr (detail::runs_in_phases<System, X, Stepping, Detector>()) {
+        return detail::run_in_phases(system, x0, options, stepping, detector, locator);
+    } else {
+        return EventHandOver<System, X, Stepping, Detector, Locator>(system, x0, options, stepping,
+                                                                     detector, locator)
+            .take();
+    }
 }
 
 /// Runs an inclusion alone: `hand_over`.

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "ricochet/detail/any_hand_over.hpp"
+#include "ricochet/detail/branch_phases_of.hpp"
 #include "ricochet/detail/debug_checks.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/minimal_selection.hpp"

@@ -255,6 +255,7 @@ requires Flowing<System, X> && StateVector<X>
                                              const Locator& locator = {})
 {
     detail::check_declarations<System, X>();
+    static_assert(detail::has_flow_alone<System>());
     static_assert(
         detail::derivatives_in_order<System, X>(),
         "ricochet: found a guard_derivative or reset_derivative that takes the Mode before "

@@ -1,0 +1,63 @@
+// Internal: the declarations of this header may change without notice.
+//
+// A hybrid system and its inclusion as one system with phases, for the loop: what a run of a system
+// with set_valued() is made of. Compiled in ricochet::nonsmooth (src/nonsmooth/phased_system.hpp).
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "ricochet/detail/branch_phases.hpp"
+#include "ricochet/detail/core.hpp"
+#include "ricochet/detail/hand_over_run.hpp"
+#include "ricochet/detail/inclusion_sizes.hpp"
+#include "ricochet/integrate/methods.hpp"
+
+namespace ricochet::detail {
+
+/// What a run with phases consists of, besides its start and its options.
+template <class C>
+struct PhasedSetup {
+    RunSetup<C> user;  ///< of the system without its inclusion
+    Owner<BranchPhases> inclusion;
+    MethodName method = MethodName::dopri5;  ///< of the explicit phases
+    /// The mode in which a system with modes continues by itself from (t, x); null without modes.
+    Mode (*start_mode)(void* door, double t, const C& x) = nullptr;
+};
+
+/// A run in phases.
+template <class C>
+class PhasedRun {
+public:
+    PhasedRun() = default;
+    PhasedRun(const PhasedRun&) = delete;
+    PhasedRun& operator=(const PhasedRun&) = delete;
+    virtual ~PhasedRun() = default;
+
+    [[nodiscard]] virtual AnyLoop<C>& loop() noexcept = 0;
+    [[nodiscard]] virtual const std::vector<Phase>& phases() const noexcept = 0;
+    /// The counts of the run, by the kind of phase.
+    [[nodiscard]] virtual HandOverStatistics statistics(const Run<C>& run) const = 0;
+    [[nodiscard]] virtual const StageReport& failure() const noexcept = 0;
+};
+
+/// @throws std::invalid_argument for options that a run with phases does not have, and for a start
+/// from which no reaction follows.
+template <class C>
+[[nodiscard]] Owner<PhasedRun<C>> make_phased_run(PhasedSetup<C>&& setup, const C& x0,
+                                                  const Options& options);
+template <>
+Owner<PhasedRun<SmallState>> make_phased_run(PhasedSetup<SmallState>&& setup, const SmallState& x0,
+                                             const Options& options);
+template <>
+Owner<PhasedRun<std::vector<double>>> make_phased_run(PhasedSetup<std::vector<double>>&& setup,
+                                                      const std::vector<double>& x0,
+                                                      const Options& options);
+
+/// Defined where solvers are compiled (nonsmooth/solvers.hpp). Null where the inclusion has no
+/// modes of branches.
+template <int N, int M>
+[[nodiscard]] Owner<BranchPhases> make_branch_phases(const AnyInclusion<N, M>& inclusion,
+                                                     const BranchPhasesOptions& options);
+
+}  // namespace ricochet::detail

@@ -1,0 +1,595 @@
+#include "phase_rules.hpp"
+
+#include <algorithm>
+#include <cstring>
+
+#include "ricochet/detail/event_loop.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+constexpr double most_patience = 0x1p20;
+/// Events within a hundredth of a step that are no longer worth locating, and events in a row
+/// between which a y stays within its error: as for hand-overs (hand_over_watches.hpp).
+constexpr double most_events = 200, most_flutters = 400;
+
+}  // namespace
+
+void PhaseRules::watch(const double* x0, std::span<const std::size_t> stands_for)
+{
+    for (auto* numbers : {&sides_, &y_, &y_before_, &lower_, &upper_, &rates_}) {
+        numbers->assign(count(), 0);
+    }
+    flow_.assign(inclusion_.size(), 0);
+    arrived_.assign(count(), false);
+    watched_.assign(count(), false);
+    branch_guards_.assign(BranchPhases::guards_of_reaction * count(), 1);
+    inclusion_.bounds(options_.t_start, x0, lower_.data(), upper_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        watched_[i] = std::isfinite(lower_[i]) && std::isfinite(upper_[i]);
+    }
+    for (const std::size_t reaction : stands_for) {
+        if (reaction != no_reaction) watched_[reaction] = true;
+    }
+}
+
+// --- the motion ---
+
+void PhaseRules::flow(Kind kind, double t, const double* x, double* dxdt)
+{
+    if (is_explicit(kind)) {
+        inclusion_.flow(branches_of(kind), t, x, dxdt);
+    } else if (is_implicit(kind)) {
+        inclusion_.selected_rate(t, x, dxdt);
+    } else {
+        std::fill_n(dxdt, inclusion_.size(), 0.0);
+    }
+}
+
+double PhaseRules::fraction_of_held(Kind kind, double t0, const double* x0, double t1,
+                                    const double* x1)
+{
+    // Below that length the motion has no smoothness that steps could follow.
+    if (t1 - t0 <= 1e-9 * (options_.t_end - options_.t_start)) return 1;
+    const double fraction = inclusion_.fraction_of_held(branches_of(kind), t0, x0, t1, x1);
+    memory_.contradicts = fraction > 0 ? 0 : 1;
+    return fraction > 0 ? fraction : 0.1;
+}
+
+GuardInfo PhaseRules::guard_info(std::size_t which) const
+{
+    if (!watches_own(which)) return inclusion_.guard_info(in_branches(which));
+    GuardInfo info;
+    info.name = "y arrives at zero";
+    info.crossing = Crossing::either;
+    return info;
+}
+
+bool PhaseRules::enabled(std::size_t which, Kind kind) const
+{
+    if (watches_own(which)) return kind == own && watched_[reaction_of(which)];
+    return is_explicit(kind) && inclusion_.enabled(in_branches(which), branches_of(kind));
+}
+
+double PhaseRules::guard(std::size_t which, Kind kind, double t, const double* x) const
+{
+    // -y, kind 1, does not depend on the branches.
+    if (watches_own(which)) return -inclusion_.guard(in_branches(which) - 4, 0, t, x);
+    return is_explicit(kind) ? inclusion_.guard(in_branches(which), branches_of(kind), t, x) : 1;
+}
+
+void PhaseRules::guards(Kind kind, double t, const double* x, std::span<double> g) const
+{
+    std::fill(g.begin(), g.end(), 1.0);
+    constexpr std::size_t from = BranchPhases::guards_of_reaction;
+    if (is_explicit(kind)) {
+        inclusion_.guards(branches_of(kind), t, x, branch_guards_.data());
+        for (std::size_t i = 0; i < count(); ++i) {
+            std::copy_n(branch_guards_.data() + from * i, from, g.data() + guards_of_reaction * i);
+        }
+    } else if (kind == own) {
+        inclusion_.observe(t, x, branch_guards_.data());
+        for (std::size_t i = 0; i < count(); ++i) {
+            g[guards_of_reaction * i + from] = branch_guards_[i];
+        }
+    }
+}
+
+double PhaseRules::guard_rate(std::size_t which, Kind kind, double t, const double* x,
+                              const double* dxdt) const
+{
+    if (watches_own(which)) return -inclusion_.guard_rate(in_branches(which) - 4, 0, t, x, dxdt);
+    return is_explicit(kind)
+               ? inclusion_.guard_rate(in_branches(which), branches_of(kind), t, x, dxdt)
+               : 0;
+}
+
+void PhaseRules::guard_rates(Kind kind, double t, const double* x, const double* dxdt,
+                             std::span<double> rates) const
+{
+    std::fill(rates.begin(), rates.end(), 0.0);
+    constexpr std::size_t from = BranchPhases::guards_of_reaction;
+    if (is_explicit(kind)) {
+        inclusion_.guard_rates(branches_of(kind), t, x, dxdt, branch_guards_.data());
+        for (std::size_t i = 0; i < count(); ++i) {
+            std::copy_n(branch_guards_.data() + from * i, from,
+                        rates.data() + guards_of_reaction * i);
+        }
+    } else if (kind == own) {
+        for (std::size_t i = 0; i < count(); ++i) {
+            if (!watched_[i]) continue;
+            const std::size_t which = guards_of_reaction * i + from;
+            rates[which] = guard_rate(which, kind, t, x, dxdt);
+        }
+    }
+}
+
+// --- where the motion is ---
+
+bool PhaseRules::are_clear(Mode b, double t, const double* x)
+{
+    inclusion_.observe(t, x, y_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (BranchPhases::branch(i, b) != Branch::inside && !is_clear(i, y_[i], x)) return false;
+    }
+    return true;
+}
+
+bool PhaseRules::is_near_surface(double t, const double* x)
+{
+    inclusion_.observe(t, x, y_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (std::fabs(y_[i]) <= 1e3 * resolution(i, x)) return true;
+    }
+    return false;
+}
+
+bool PhaseRules::has_finite_bounds(Mode at, double t, const double* x)
+{
+    inclusion_.bounds(t, x, lower_.data(), upper_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        const Branch branch = BranchPhases::branch(i, at);
+        if (branch == Branch::lower && std::isinf(lower_[i])) return false;
+        if (branch == Branch::upper && std::isinf(upper_[i])) return false;
+    }
+    return true;
+}
+
+// --- entering ---
+
+Kind PhaseRules::enter(double t, double* x)
+{
+    memory_ = {};
+    changes_.clear();
+    phases_.clear();
+    bool clear = true;
+    inclusion_.observe(t, x, y_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        clear = clear && (!watched_[i] || is_clear(i, y_[i], x));
+    }
+    const Kind kind = clear ? own : kind_for(inclusion_.start(t, x), t, x, PhaseCause::start);
+    note_sides(t, x);
+    note(kind, t, PhaseCause::start);
+    return kind;
+}
+
+Kind PhaseRules::kind_for(Mode b, double t, const double* x, PhaseCause cause)
+{
+    const Mode several = inclusion_.branch_modes();
+    cause_ = cause;
+    if (b < several) return explicit_in(b);
+    if (b == several) return go_by_steps(PhaseCause::several, t, x);
+    if (b == several + 1) return go_by_steps(PhaseCause::no_flow, t, x);
+    inclusion_.note_faulty(t, x);
+    return end_with(Outcome::not_converged);
+}
+
+Kind PhaseRules::go_by_steps(PhaseCause cause, double t, const double* x)
+{
+    // A phase that is entered again immediately is kept longer each time.
+    const bool at_once = t - memory_.since < 10 * options_.step;
+    memory_.patience = at_once ? std::min(2 * memory_.patience, most_patience) : 1;
+    const bool chatters = cause == PhaseCause::chattering;
+    if (chatters) {
+        memory_.patience = memory_.chatter_patience;
+        memory_.chatter_patience = std::min(2 * memory_.chatter_patience, most_patience);
+    }
+    memory_.steps = 0;
+    cause_ = cause;
+    Mode b = 0;
+    if (!inclusion_.select(t, x, b)) return end_with(Outcome::not_converged);
+    memory_.across = b;
+    return chatters ? across() : implicit_in(b);
+}
+
+// --- sets ---
+
+Kind PhaseRules::decide(const Set& set, double* x)
+{
+    changes_.clear();
+    std::fill(arrived_.begin(), arrived_.end(), false);
+    if (set.kind == over()) return over();
+    inclusion_.observe(set.t, set.before, y_before_.data());
+    inclusion_.observe(set.t, x, y_.data());
+    cause_ = PhaseCause::held;
+    const Mode before = branches_before(set);
+    const bool was_own = has_own_guards(set.kind);
+    const Kind next = was_own                 ? decide_own(set, x)
+                      : is_explicit(set.kind) ? decide_explicit(set, x)
+                                              : decide_implicit(set, x);
+    if (!has_own_guards(next) && next != over()) note_changes(set, before, next, x);
+    if (!was_own && is_explicit(set.kind)) note_flutter(set, next, x);
+    if (next != set.kind) {
+        const bool by_steps = is_implicit(next) && !is_implicit(set.kind);
+        note(next, set.t, is_set_valued(next) && !by_steps ? PhaseCause::held : cause_);
+    }
+    note_sides(set.t, x);
+    return next;
+}
+
+Kind PhaseRules::decide_own(const Set& set, double* x)
+{
+    Mode at = inclusion_.signs(set.t, x);
+    bool asks = false;
+    for (const Fired& fired : set.fired) {
+        const bool of_set = fired.which != no_guard && kind_of_guard(fired.which) == 4;
+        if (of_set) return kind_for(inclusion_.branch_modes() + 2, set.t, x, cause_);
+        const std::size_t i = fired.which != no_guard ? reaction_of(fired.which) : fired.reaction;
+        if (y_[i] != y_before_[i]) continue;  // a reset has moved it on
+        arrived_[i] = asks = true;
+        at = BranchPhases::with_branch(i, Branch::inside, at);
+    }
+    for (std::size_t i = 0; i < count(); ++i) {
+        asks = asks || (watched_[i] && !is_clear(i, y_[i], x));
+    }
+    if (!asks) {
+        const bool moves = !std::equal(x, x + inclusion_.size(), set.before);
+        return moves ? own : set.kind;
+    }
+    if (!has_finite_bounds(at, set.t, x)) return end_with(Outcome::not_handed_over);
+    return kind_for(inclusion_.arrive(at, set.t, x), set.t, x, PhaseCause::held);
+}
+
+Mode PhaseRules::branches_after(Mode b, double t, const double* x)
+{
+    const Mode signs = inclusion_.signs(t, x);
+    for (std::size_t i = 0; i < count(); ++i) {
+        const Branch sign = BranchPhases::branch(i, signs);
+        if (y_[i] == y_before_[i] || sign == Branch::inside) continue;
+        b = BranchPhases::with_branch(i, sign, b);
+    }
+    return b;
+}
+
+Kind PhaseRules::decide_explicit(const Set& set, double* x)
+{
+    const double t = set.t;
+    const bool moves = !std::equal(x, x + inclusion_.size(), set.before);
+    const Mode b = branches_of(set.kind);
+    const Mode from = moves ? branches_after(b, t, x) : b;
+    kept_.clear();
+    for (const Fired& fired : set.fired) {
+        if (fired.which == no_guard) continue;
+        const std::size_t i = reaction_of(fired.which);
+        if (y_[i] != y_before_[i]) continue;
+        arrived_[i] = kind_of_guard(fired.which) < 2;
+        kept_.push_back(in_branches(fired.which));
+        ++memory_.events;
+    }
+    if (!kept_.empty()) return kind_for(inclusion_.reset(kept_, from, t, x), t, x, cause_);
+    // Loads may have jumped, and a reset may have set a y to zero.
+    bool asks =
+        (moves || set.on_time) && inclusion_.holds(from) && !inclusion_.stays_held(from, t, x);
+    Mode at = from;
+    const Mode signs = inclusion_.signs(t, x);
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (BranchPhases::branch(i, signs) != Branch::inside) continue;
+        if (y_[i] == y_before_[i]) continue;
+        at = BranchPhases::with_branch(i, Branch::inside, at);
+        asks = asks || BranchPhases::branch(i, from) != Branch::inside;
+    }
+    if (!asks) return explicit_in(from);
+    if (!has_finite_bounds(at, t, x)) return end_with(Outcome::not_handed_over);
+    return kind_for(inclusion_.arrive(at, t, x), t, x, cause_);
+}
+
+Kind PhaseRules::decide_implicit(const Set& set, double* x)
+{
+    const bool moves = !std::equal(x, x + inclusion_.size(), set.before);
+    if (set.on_change && !moves) {
+        const Mode b = inclusion_.change(branches_of(set.kind), set.t, x);
+        arrived_[inclusion_.changed()] = true;
+        memory_.changed_at = set.t;
+        memory_.steps = 0;
+        return implicit_in(b);
+    }
+    if (!moves && !(set.on_time && inclusion_.jumps(set.t, x))) return set.kind;
+    Mode b = 0;
+    if (!inclusion_.select(set.t, x, b)) return end_with(Outcome::not_converged);
+    memory_.across = b;
+    return set.kind == across() ? across() : implicit_in(b);
+}
+
+Mode PhaseRules::branches_before(const Set& set) const
+{
+    if (set.kind == across()) return static_cast<Mode>(memory_.across);
+    if (!has_own_guards(set.kind)) return branches_of(set.kind);
+    Mode b = 0;
+    for (std::size_t i = 0; i < count(); ++i) {
+        const Branch side = sides_[i] >= 0 ? Branch::lower : Branch::upper;
+        b = BranchPhases::with_branch(i, side, b);
+    }
+    return b;
+}
+
+void PhaseRules::note_changes(const Set& set, Mode before, Kind next, const double* /*x*/)
+{
+    const Mode after = next == across() ? static_cast<Mode>(memory_.across) : branches_of(next);
+    for (std::size_t i = 0; i < count(); ++i) {
+        const Branch from = BranchPhases::branch(i, before);
+        const Branch to = BranchPhases::branch(i, after);
+        ReactionChange change{.reaction = i};
+        if (from == Branch::inside && to != Branch::inside) {
+            change.kind = EventKind::slip;
+        } else if (from != Branch::inside && to == Branch::inside) {
+            change.kind = EventKind::stick;
+        } else if (from != to && arrived_[i]) {
+            change.kind = EventKind::mode;
+        } else if (from == to && arrived_[i] && has_own_guards(set.kind)) {
+            change.kind = EventKind::touch;
+        } else {
+            continue;
+        }
+        for (const Fired& fired : set.fired) {
+            if (fired.which != no_guard && reaction_of(fired.which) == i) {
+                change.fired = fired.which;
+            } else if (fired.reaction == i && change.kind != EventKind::slip) {
+                change.guard = std::min(change.guard, fired.guard);
+            }
+        }
+        changes_.push_back(change);
+    }
+}
+
+bool PhaseRules::records(std::size_t reaction, std::size_t guard) const
+{
+    for (const ReactionChange& change : changes_) {
+        if (change.reaction == reaction && change.guard != no_guard) return change.guard == guard;
+    }
+    return true;
+}
+
+void PhaseRules::note_flutter(const Set& set, Kind next, const double* x)
+{
+    for (const Fired& fired : set.fired) {
+        if (fired.which == no_guard) continue;
+        const std::size_t i = reaction_of(fired.which);
+        double speed = std::numeric_limits<double>::infinity();
+        if (kind_of_guard(fired.which) < 2 && is_explicit(next)) {
+            std::vector<double> rate(inclusion_.size());
+            inclusion_.flow(branches_of(next), set.t, x, rate.data());
+            speed = std::fabs(inclusion_.rate_of(i, rate.data()));
+        }
+        // The largest |y| is that of a parabola between two zeros.
+        const bool flutters = speed * (set.t - memory_.fluttered_at) / 4 <= resolution(i, x);
+        memory_.fluttering = flutters ? memory_.fluttering + 1 : 0;
+        memory_.fluttered_at = set.t;
+    }
+}
+
+void PhaseRules::note_sides(double t, const double* x)
+{
+    inclusion_.observe(t, x, y_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (y_[i] != 0) sides_[i] = std::copysign(1.0, y_[i]);
+    }
+}
+
+void PhaseRules::note(Kind kind, double t, PhaseCause cause)
+{
+    memory_.contradicts = 0;
+    const double sort = has_own_guards(kind) ? 0 : is_explicit(kind) ? 1 : 2;
+    if (phases_.empty() || sort != memory_.sort) {
+        memory_.events = memory_.marked_events = memory_.fluttering = 0;
+        memory_.marked_at = memory_.since = t;
+        memory_.sort = sort;
+    }
+    const bool set_valued = is_set_valued(kind);
+    const bool plainly = cause == PhaseCause::held || cause == PhaseCause::released;
+    const bool goes_on = !phases_.empty() && set_valued == (memory_.set_valued != 0);
+    if (goes_on && (!set_valued || plainly)) return;
+    memory_.set_valued = set_valued;
+    phases_.push_back({.from = t,
+                       .set_valued = set_valued,
+                       .cause = set_valued || phases_.empty() ? cause : PhaseCause::released});
+    memory_.listed = static_cast<double>(phases_.size());
+}
+
+// --- after steps ---
+
+PhaseRules::Verdict PhaseRules::change_to(Kind kind, double t, PhaseCause cause, double h)
+{
+    if (kind == over()) {
+        return {PhaseVerdict::Kind::ends, kind, 0, static_cast<Outcome>(memory_.outcome)};
+    }
+    note(kind, t, cause);
+    return {PhaseVerdict::Kind::changes, kind, h};
+}
+
+PhaseRules::Verdict PhaseRules::review(const Step& step, double* x)
+{
+    if (step.kind == over()) {
+        return {PhaseVerdict::Kind::ends, step.kind, 0, static_cast<Outcome>(memory_.outcome)};
+    }
+    note_sides(step.t, x);
+    if (has_own_guards(step.kind)) return review_own(step, x);
+    if (is_explicit(step.kind)) return review_explicit(step.kind, step.t, x);
+    return review_implicit(step.kind, step.t, step.has_advanced, x);
+}
+
+bool PhaseRules::may_arrive(const Step& step, double reach)
+{
+    inclusion_.observe_rate(step.t, step.rate, rates_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (!watched_[i] || !(y_[i] * rates_[i] < 0)) continue;
+        if (std::fabs(y_[i]) <= reach * std::fabs(rates_[i])) return true;
+    }
+    return false;
+}
+
+bool PhaseRules::is_flow_of(Mode b, const Step& step, const double* x)
+{
+    inclusion_.flow(b, step.t, x, flow_.data());
+    double size = 0, off = 0;
+    for (std::size_t c = 0; c < flow_.size(); ++c) {
+        size = std::fmax(size, std::fabs(step.rate[c]));
+        off = std::fmax(off, std::fabs(flow_[c] - step.rate[c]));
+    }
+    return off <= 1e-6 * size;
+}
+
+// A flow that is written with the sign of y jumps where y arrives, and what the stages of a step
+// see beyond is another motion. Near y = 0 the step is therefore one of the inclusion, whose
+// branches are smooth there.
+PhaseRules::Verdict PhaseRules::review_own(const Step& step, const double* x)
+{
+    if (is_approach(step.kind)) {
+        if (may_arrive(step, 4 * step.h_next)) return {};
+        return change_to(own, step.t, PhaseCause::released, -1);
+    }
+    if (!may_arrive(step, 2 * step.h_next)) return {};
+    const Mode b = inclusion_.signs(step.t, x);
+    const bool plain = !inclusion_.holds(b) && has_finite_bounds(b, step.t, x);
+    if (!plain || !is_flow_of(b, step, x)) return {};
+    return change_to(approach_in(b), step.t, PhaseCause::released, -1);
+}
+
+bool PhaseRules::chatters(double t) noexcept
+{
+    if (memory_.events < memory_.marked_events + most_events) return false;
+    const bool chatters = t - memory_.marked_at < options_.step / 100;
+    memory_.marked_events = memory_.events;
+    memory_.marked_at = t;
+    return chatters;
+}
+
+PhaseRules::Verdict PhaseRules::review_explicit(Kind kind, double t, double* x)
+{
+    const Mode b = branches_of(kind);
+    bool contradicts = memory_.contradicts != 0;
+    for (std::size_t i = 0; i < count(); ++i) {
+        const Branch branch = BranchPhases::branch(i, b);
+        const bool wrong =
+            branch == Branch::lower ? y_[i] < 0 : branch == Branch::upper && y_[i] > 0;
+        contradicts = contradicts || (wrong && std::fabs(y_[i]) > 10 * resolution(i, x));
+    }
+    const auto by_steps = [&](PhaseCause cause) {
+        return change_to(go_by_steps(cause, t, x), t, cause, options_.step);
+    };
+    if (contradicts) return by_steps(PhaseCause::contradiction);
+    if (!inclusion_.holds(b) && are_clear(b, t, x)) return release(t);
+    if (chatters(t)) return by_steps(PhaseCause::chattering);
+    if (memory_.fluttering > most_flutters) {
+        inclusion_.hold(inclusion_.signs(t, x), t, x);
+        return by_steps(PhaseCause::accumulation);
+    }
+    return {};
+}
+
+PhaseRules::Verdict PhaseRules::review_implicit(Kind kind, double t, bool has_advanced, double* x)
+{
+    if (has_advanced) {
+        ++memory_.steps;
+        ++implicit_steps_;
+        if (inclusion_.law() > 1e-6) {
+            return {PhaseVerdict::Kind::ends, kind, 0, Outcome::law_violated};
+        }
+    }
+    Mode b = branches_of(kind);
+    if (kind == across()) {
+        b = inclusion_.branches_at_end();
+        // Changes that are not located restart the count.
+        if (b != static_cast<Mode>(memory_.across)) memory_.steps = 0;
+        memory_.across = b;
+    }
+    if (!inclusion_.holds(b) && are_clear(b, t, x)) return release(t);
+    if (memory_.steps < memory_.patience || !inclusion_.flows(b)) return {};
+    // The branch of a y that has just left zero tells its direction, so its size is not tested.
+    Mode tested = b;
+    if (memory_.changed_at == t) {
+        tested = BranchPhases::with_branch(inclusion_.changed(), Branch::inside, b);
+    }
+    if (!are_clear(tested, t, x)) return {};
+    for (std::size_t i = 0; i < count(); ++i) {
+        const Branch branch = BranchPhases::branch(i, b);
+        const bool wrong = branch == Branch::lower ? y_[i] < 0 : y_[i] > 0;
+        if (wrong) b = BranchPhases::with_branch(i, Branch::inside, b);
+    }
+    std::vector<double> held(x, x + inclusion_.size());
+    inclusion_.hold(b, t, held.data());
+    try {
+        const Mode next = inclusion_.start(t, held.data());
+        if (next >= inclusion_.branch_modes()) return {};
+        std::copy(held.begin(), held.end(), x);
+        return change_to(explicit_in(next), t, PhaseCause::released);
+    } catch (const InclusionRefused&) {
+        return {};
+    }
+}
+
+PhaseRules::Verdict PhaseRules::give_up(const End& end, double* x)
+{
+    if (is_implicit(end.kind)) {
+        const bool unsolved =
+            end.outcome == Outcome::non_finite || end.outcome == Outcome::step_underflow;
+        if (!unsolved || end.which != no_guard || !end.of_phases) return {};
+        return {PhaseVerdict::Kind::ends, end.kind, 0, Outcome::not_converged};
+    }
+    const auto cause = cause_after(end.outcome);
+    if (!cause || end.kind == over()) return {};
+    if (has_own_guards(end.kind)) {
+        if (!is_near_surface(end.t, x)) return {};
+        if (end.t == memory_.gave_up_at) {
+            return {PhaseVerdict::Kind::ends, end.kind, 0, Outcome::not_handed_over};
+        }
+        memory_.gave_up_at = end.t;
+        Mode at = inclusion_.signs(end.t, x);
+        for (std::size_t i = 0; i < count(); ++i) {
+            if (is_clear(i, y_[i], x)) continue;
+            at = BranchPhases::with_branch(i, Branch::inside, at);
+        }
+        if (!has_finite_bounds(at, end.t, x)) return {};
+        const Kind next = kind_for(inclusion_.arrive(at, end.t, x), end.t, x, *cause);
+        return change_to(next, end.t, *cause);
+    }
+    if (!end.of_phases) return {};
+    if (*cause == PhaseCause::accumulation && end.which != no_guard) {
+        const std::size_t i = reaction_of(end.which);
+        const Mode b = branches_of(end.kind);
+        inclusion_.hold(BranchPhases::with_branch(i, Branch::inside, b), end.t, x);
+    }
+    return change_to(go_by_steps(*cause, end.t, x), end.t, *cause, options_.step);
+}
+
+// --- memory ---
+
+void PhaseRules::save(std::vector<double>& memory) const
+{
+    memory.resize(remembered);
+    std::memcpy(memory.data(), &memory_, sizeof memory_);
+    memory.insert(memory.end(), sides_.begin(), sides_.end());
+    inclusion_.save(memory);
+}
+
+void PhaseRules::restore(const std::vector<double>& memory)
+{
+    std::memcpy(static_cast<void*>(&memory_), memory.data(), sizeof memory_);
+    const double* const sides = memory.data() + remembered;
+    std::copy_n(sides, sides_.size(), sides_.begin());
+    inclusion_.restore(std::span(memory).subspan(remembered + sides_.size()));
+    const auto listed = static_cast<std::size_t>(memory_.listed);
+    if (phases_.size() > listed) phases_.resize(listed);
+}
+
+}  // namespace ricochet::detail

@@ -1,0 +1,268 @@
+// The rules by which the phases of a set-valued run follow each other.
+//
+// The inclusion decides while some y is not clear of zero. Its motion is explicit where every
+// reaction is at a bound or held, and implicit where that is impossible: changes that coincide,
+// reactions that y' = 0 does not determine, switchings that accumulate or chatter. Nothing is kept
+// beside time, mode and state but the numbers of `Memory`.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "ricochet/detail/branch_phases.hpp"
+#include "ricochet/detail/hand_over_run.hpp"
+#include "ricochet/detail/phase_table.hpp"
+
+namespace ricochet::detail {
+
+/// Kind of a phase.
+using Kind = Mode;
+
+struct PhaseOptions {
+    double t_start = 0, t_end = 0;  ///< [s]
+    double rtol = 0, atol = 0;
+    double step = 0;  ///< [s] length of implicit steps
+};
+
+class PhaseRules {
+public:
+    static constexpr Kind own = 0;
+    /// Those of `BranchPhases`, and y, which is watched in own phases.
+    static constexpr std::size_t guards_of_reaction = BranchPhases::guards_of_reaction + 1;
+
+    PhaseRules(BranchPhases& inclusion, const PhaseOptions& options)
+        : inclusion_(inclusion), options_(options)
+    {
+    }
+
+    [[nodiscard]] const PhaseOptions& options() const noexcept { return options_; }
+
+    /// Chooses the reactions whose y is watched in own phases: where both bounds are finite, or a
+    /// guard of the system stands for y. One with an infinite bound, such as the reaction of a
+    /// floor to a speed, may be a law of some modes only.
+    /// @param stands_for  the reaction that each guard of the system stands for
+    void watch(const double* x0, std::span<const std::size_t> stands_for);
+
+    // --- kinds ---
+
+    [[nodiscard]] Kind kinds() const noexcept { return over() + 1; }
+    [[nodiscard]] Kind across() const noexcept { return 1 + 2 * inclusion_.branch_modes(); }
+    [[nodiscard]] bool is_approach(Kind kind) const noexcept
+    {
+        return kind > across() && kind < over();
+    }
+    [[nodiscard]] bool is_explicit(Kind kind) const noexcept
+    {
+        return (kind != own && kind <= inclusion_.branch_modes()) || is_approach(kind);
+    }
+    /// Whether the guards that stand for a y are watched.
+    [[nodiscard]] bool has_own_guards(Kind kind) const noexcept
+    {
+        return kind == own || is_approach(kind);
+    }
+    [[nodiscard]] bool is_implicit(Kind kind) const noexcept
+    {
+        return kind > inclusion_.branch_modes() && kind <= across();
+    }
+    /// Of a kind with branches, else 0.
+    [[nodiscard]] Mode branches_of(Kind kind) const noexcept
+    {
+        if (is_approach(kind)) return kind - 1 - across();
+        if (is_explicit(kind)) return kind - 1;
+        return is_implicit(kind) && kind != across() ? kind - 1 - inclusion_.branch_modes() : 0;
+    }
+    [[nodiscard]] bool holds(Kind kind) const noexcept
+    {
+        return is_explicit(kind) && inclusion_.holds(branches_of(kind));
+    }
+
+    // --- the motion ---
+
+    void flow(Kind kind, double t, const double* x, double* dxdt);
+    [[nodiscard]] double fraction_of_held(Kind kind, double t0, const double* x0, double t1,
+                                          const double* x1);
+
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const;
+    [[nodiscard]] bool enabled(std::size_t which, Kind kind) const;
+    [[nodiscard]] double guard(std::size_t which, Kind kind, double t, const double* x) const;
+    void guards(Kind kind, double t, const double* x, std::span<double> g) const;
+    [[nodiscard]] double guard_rate(std::size_t which, Kind kind, double t, const double* x,
+                                    const double* dxdt) const;
+    void guard_rates(Kind kind, double t, const double* x, const double* dxdt,
+                     std::span<double> rates) const;
+
+    // --- rules ---
+
+    /// The kind of phase in which a run starts. @throws InclusionRefused
+    [[nodiscard]] Kind enter(double t, double* x);
+
+    /// A guard of a set: one of the phases, or one of the system that stands for a reaction.
+    struct Fired {
+        std::size_t which = no_guard;  ///< of the phases
+        std::size_t guard = no_guard;  ///< of the system
+        std::size_t reaction = no_reaction;
+    };
+    struct Set {
+        Kind kind;
+        double t;
+        std::span<const Fired> fired;
+        bool on_time, on_change;
+        const double* before;
+    };
+    [[nodiscard]] Kind decide(const Set& set, double* x);
+    [[nodiscard]] std::span<const ReactionChange> changes() const noexcept { return changes_; }
+    /// Whether a guard of the system has an event of its own in the last set.
+    [[nodiscard]] bool records(std::size_t reaction, std::size_t guard) const;
+
+    struct Verdict {
+        PhaseVerdict::Kind what = PhaseVerdict::Kind::stands;
+        Kind kind = own;
+        double h = 0;
+        Outcome outcome = Outcome::reached_end;
+    };
+    struct Step {
+        Kind kind;
+        double t;
+        const double* rate;
+        double h_next;
+        bool has_advanced;
+    };
+    [[nodiscard]] Verdict review(const Step& step, double* x);
+
+    struct End {
+        Kind kind;
+        Outcome outcome;
+        double t;
+        bool of_phases;        ///< not by a guard of the system
+        std::size_t which;     ///< guard of the phases, or `no_guard`
+        std::size_t reaction;  ///< that the guard of the system stands for, or `no_reaction`
+    };
+    [[nodiscard]] Verdict give_up(const End& end, double* x);
+
+    // --- records ---
+
+    [[nodiscard]] const std::vector<Phase>& phases() const noexcept { return phases_; }
+    [[nodiscard]] std::uint64_t implicit_steps() const noexcept { return implicit_steps_; }
+
+    void save(std::vector<double>& memory) const;
+    void restore(const std::vector<double>& memory);
+
+private:
+    static constexpr double never = std::numeric_limits<double>::lowest();
+    /// What the rules remember. Numbers, as snapshots are.
+    struct Memory {
+        double set_valued = 0;         ///< whether the phase that is listed last is
+        double sort = 0;               ///< own, explicit or implicit
+        double since = never;          ///< [s] since when
+        double patience = 1;           ///< implicit steps before explicit ones are tried
+        double chatter_patience = 10;  ///< found by trial; 1 hands back during the chattering
+        double steps = 0;              ///< implicit ones since the last change
+        double across = 0;             ///< branches in a phase across changes
+        double changed_at = never;     ///< [s]
+        double events = 0;             ///< in this explicit phase
+        double marked_events = 0, marked_at = 0;  ///< [s] of the watch for chattering
+        double fluttering = 0, fluttered_at = 0;  ///< number of flutters in a row, time [s]
+        double contradicts = 0;     ///< a held reaction was beyond its bound at the start of a step
+        double gave_up_at = never;  ///< [s]
+        double outcome = 0;         ///< of a run that is over
+        double listed = 0;          ///< number of phases
+    };
+    static constexpr std::size_t remembered = sizeof(Memory) / sizeof(double);
+
+    [[nodiscard]] Kind over() const noexcept { return across() + 1 + inclusion_.branch_modes(); }
+    [[nodiscard]] Kind approach_in(Mode b) const noexcept { return across() + 1 + b; }
+    [[nodiscard]] Kind explicit_in(Mode b) const noexcept { return 1 + b; }
+    [[nodiscard]] Kind implicit_in(Mode b) const noexcept
+    {
+        return 1 + inclusion_.branch_modes() + b;
+    }
+    [[nodiscard]] bool is_set_valued(Kind kind) const noexcept
+    {
+        return holds(kind) || is_implicit(kind);
+    }
+    [[nodiscard]] std::size_t count() const noexcept { return inclusion_.reactions(); }
+
+    /// Size of y_i that the tolerances of a step resolve.
+    [[nodiscard]] double resolution(std::size_t i, const double* x) const
+    {
+        return options_.atol + options_.rtol * inclusion_.size_of_row(i, x);
+    }
+    /// Whether y_i is farther from zero than the error of a thousand steps.
+    [[nodiscard]] bool is_clear(std::size_t i, double y, const double* x) const
+    {
+        return std::fabs(y) >= 1e3 * resolution(i, x);
+    }
+    /// Whether the y of all reactions at a bound are.
+    [[nodiscard]] bool are_clear(Mode b, double t, const double* x);
+    [[nodiscard]] bool is_near_surface(double t, const double* x);
+
+    [[nodiscard]] Kind decide_own(const Set& set, double* x);
+    [[nodiscard]] Kind decide_explicit(const Set& set, double* x);
+    [[nodiscard]] Kind decide_implicit(const Set& set, double* x);
+    /// Branches of an explicit phase after resets that have moved the state from `before`.
+    [[nodiscard]] Mode branches_after(Mode b, double t, const double* x);
+    [[nodiscard]] Mode branches_before(const Set& set) const;
+    [[nodiscard]] bool has_finite_bounds(Mode at, double t, const double* x);
+
+    /// The kind of phase for a mode of `BranchPhases`.
+    [[nodiscard]] Kind kind_for(Mode b, double t, const double* x, PhaseCause cause);
+    [[nodiscard]] Kind go_by_steps(PhaseCause cause, double t, const double* x);
+    [[nodiscard]] Kind end_with(Outcome outcome) noexcept
+    {
+        memory_.outcome = static_cast<double>(outcome);
+        return over();
+    }
+
+    void note_changes(const Set& set, Mode before, Kind next, const double* x);
+    void note_flutter(const Set& set, Kind next, const double* x);
+    void note_sides(double t, const double* x);
+    void note(Kind kind, double t, PhaseCause cause);
+    [[nodiscard]] bool chatters(double t) noexcept;
+
+    /// Whether a watched y may arrive at zero within `reach` [s].
+    [[nodiscard]] bool may_arrive(const Step& step, double reach);
+    /// Whether the flow of the system is that of the inclusion in branches b.
+    [[nodiscard]] bool is_flow_of(Mode b, const Step& step, const double* x);
+    [[nodiscard]] Verdict review_own(const Step& step, const double* x);
+    [[nodiscard]] Verdict review_explicit(Kind kind, double t, double* x);
+    [[nodiscard]] Verdict review_implicit(Kind kind, double t, bool has_advanced, double* x);
+    [[nodiscard]] Verdict change_to(Kind kind, double t, PhaseCause cause, double h = 0);
+    [[nodiscard]] Verdict release(double t) { return change_to(own, t, PhaseCause::released, -1); }
+
+    [[nodiscard]] static std::size_t reaction_of(std::size_t which) noexcept
+    {
+        return which / guards_of_reaction;
+    }
+    [[nodiscard]] static std::size_t kind_of_guard(std::size_t which) noexcept
+    {
+        return which % guards_of_reaction;
+    }
+    [[nodiscard]] static std::size_t in_branches(std::size_t which) noexcept
+    {
+        return BranchPhases::guards_of_reaction * reaction_of(which) + kind_of_guard(which);
+    }
+    [[nodiscard]] static bool watches_own(std::size_t which) noexcept
+    {
+        return kind_of_guard(which) == BranchPhases::guards_of_reaction;
+    }
+
+    BranchPhases& inclusion_;
+    PhaseOptions options_;
+    std::vector<bool> watched_;
+    Memory memory_;
+    std::vector<double> sides_;  ///< sign of each y when it was last not zero
+    std::vector<double> y_, y_before_, lower_, upper_, rates_, flow_;
+    std::vector<bool> arrived_;
+    std::vector<std::size_t> kept_;
+    mutable std::vector<double> branch_guards_;
+    std::vector<ReactionChange> changes_;
+    std::vector<Phase> phases_;
+    PhaseCause cause_ = PhaseCause::start;  ///< why the phase that was entered last began
+    std::uint64_t implicit_steps_ = 0;
+};
+
+}  // namespace ricochet::detail

@@ -1,0 +1,116 @@
+#include "ricochet/detail/phased_run.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "phased_system.hpp"
+#include "ricochet/detail/event_loop.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+template <class C>
+class PhasedRunOf final : public PhasedRun<C> {
+public:
+    PhasedRunOf(PhasedSetup<C>&& setup, const C& x0, const Options& options)
+        : setup_(setup.user), system_(std::move(setup), x0, phase_options(options))
+    {
+        setup_.system = &system_.table();
+        setup_.door = &system_;
+        setup_.quiet = nullptr;
+        setup_.quiet_on_series = false;
+        C x = x0;
+        Options inner = options;
+        inner.mode = system_.enter(options.mode, options.t_start, x);
+        loop_ = make_loop(setup_, x, inner);
+    }
+
+    [[nodiscard]] AnyLoop<C>& loop() noexcept override { return *loop_; }
+    [[nodiscard]] const std::vector<Phase>& phases() const noexcept override
+    {
+        return system_.rules().phases();
+    }
+    [[nodiscard]] HandOverStatistics statistics(const Run<C>& run) const override
+    {
+        HandOverStatistics out;
+        const std::uint64_t implicit = system_.rules().implicit_steps();
+        out.event_driven = run.statistics;
+        out.event_driven.steps -= std::min(implicit, run.statistics.steps);
+        out.set_valued.attempted = system_.inclusion().attempts();
+        out.set_valued.accepted = implicit;
+        out.set_valued.stages = system_.inclusion().stages();
+        const std::vector<Phase>& phases = this->phases();
+        for (std::size_t k = 0; k < phases.size(); ++k) {
+            if (!phases[k].set_valued) {
+                out.to_events += k > 0;
+                continue;
+            }
+            ++out.to_set_valued;
+            out.set_valued_time += (k + 1 < phases.size() ? phases[k + 1].from : run.t);
+            out.set_valued_time -= phases[k].from;
+        }
+        return out;
+    }
+    [[nodiscard]] const StageReport& failure() const noexcept override
+    {
+        return system_.inclusion().failure();
+    }
+
+private:
+    [[nodiscard]] static PhaseOptions phase_options(const Options& options)
+    {
+        const HandOverOptions of = completed(options_of_phases(options), false);
+        return {.t_start = of.t_start,
+                .t_end = of.t_end,
+                .rtol = of.rtol,
+                .atol = of.atol,
+                .step = of.set_valued.step};
+    }
+
+    RunSetup<C> setup_;
+    PhasedSystem<C> system_;
+    Owner<AnyLoop<C>> loop_;
+};
+
+template <class C>
+void refuse_bad_start(const C& x0)
+{
+    for (std::size_t i = 0; i < static_cast<std::size_t>(x0.size()); ++i) {
+        if (!std::isfinite(x0[i])) throw_start_not_finite("integrate", i, x0[i]);
+    }
+}
+
+}  // namespace
+
+HandOverOptions options_of_phases(const Options& options)
+{
+    Options supported = options;
+    supported.stop_at_event = supported.record_steps = false;
+    if (!options.component_atol.empty()) {
+        supported.atol =
+            *std::max_element(options.component_atol.begin(), options.component_atol.end());
+        supported.component_atol.clear();
+    }
+    return hand_over_options(supported);
+}
+
+template <>
+Owner<PhasedRun<SmallState>> make_phased_run(PhasedSetup<SmallState>&& setup, const SmallState& x0,
+                                             const Options& options)
+{
+    refuse_bad_start(x0);
+    return Owner<PhasedRun<SmallState>>(new PhasedRunOf<SmallState>(std::move(setup), x0, options));
+}
+
+template <>
+Owner<PhasedRun<std::vector<double>>> make_phased_run(PhasedSetup<std::vector<double>>&& setup,
+                                                      const std::vector<double>& x0,
+                                                      const Options& options)
+{
+    refuse_bad_start(x0);
+    return Owner<PhasedRun<std::vector<double>>>(
+        new PhasedRunOf<std::vector<double>>(std::move(setup), x0, options));
+}
+
+}  // namespace ricochet::detail
