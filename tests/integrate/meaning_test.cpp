@@ -839,7 +839,7 @@ TEST(Meaning, NoFunctionIsCalledInAModeThatHasBeenLeftByAnEventOfACycle)
     tanks.guard_count_ = tanks.mode_count_ = 2;
     tanks.f = [&](Mode m, double, const auto&, auto& dxdt) {
         late += m != now;
-        dxdt = {m == 0 ? 2 : -2, m == 1 ? 1 : -3};
+        dxdt = {m == 0 ? 2.0 : -2.0, m == 1 ? 1.0 : -3.0};
     };
     tanks.g = [&](std::size_t i, Mode m, double, const auto& x) {
         late += m != now;

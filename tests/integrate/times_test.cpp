@@ -293,8 +293,8 @@ void expect_monostable(const Run& run, double tolerance)
     EXPECT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 16U);
     for (std::size_t k = 0; k < 8; ++k) {
-        EXPECT_NEAR(run.events[2 * k].t, 1 + 1.25 * k, tolerance);
-        EXPECT_NEAR(run.events[2 * k + 1].t, 1.25 * (k + 1), tolerance);
+        EXPECT_NEAR(run.events[2 * k].t, 1 + 1.25 * static_cast<double>(k), tolerance);
+        EXPECT_NEAR(run.events[2 * k + 1].t, 1.25 * static_cast<double>(k + 1), tolerance);
         EXPECT_EQ(run.events[2 * k + 1].kind, EventKind::time);
     }
 }

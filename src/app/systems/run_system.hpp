@@ -120,6 +120,8 @@ template <class X>
                                  .mode = run.mode,
                                  .guard = run.guard,
                                  .other_guard = run.other_guard,
+                                 .reason = run.reason,
+                                 .armed_beyond = run.armed_beyond,
                                  .events = {},
                                  .trajectory = {.t = run.trajectory.t, .x = {}},
                                  .solution = {},
@@ -136,7 +138,8 @@ template <class X>
                               .bracket = event.bracket,
                               .slope = event.slope,
                               .error = event.error,
-                              .late = event.late});
+                              .late = event.late,
+                              .reaction = event.reaction});
     }
     for (const X& x : run.trajectory.x) out.trajectory.x.push_back(plain(x));
     return out;
