@@ -214,7 +214,7 @@ struct LoadedBelt {
 };
 
 /// The run agrees with that of the inclusion alone, and its sticking does not cause many
-/// crossings: 201 to 401 at each of a few hand-overs.
+/// crossings: far fewer than the 401 a phase that a run by events needs to see that it chatters.
 void expect_few_crossings(const LoadedBelt& belt, const LoadedBelt::State& x0, double t_end,
                           double tolerance)
 {
