@@ -915,10 +915,10 @@ protected:
     SystemAt<X> system_;
     Finders<X> finders_;
     bool error_controlled_;
-    bool guarded_;     ///< has guards, even if their number is zero so far
+    bool guarded_;  ///< has guards, even if their number is zero so far
     const PhaseTable<X>* phases_;
     std::size_t own_guards_;  ///< number of guards of the system, without those of the phases
-    bool resets_any_;  ///< has resets
+    bool resets_any_;         ///< has resets
     bool timed_;
     std::conditional_t<single, Never, bool> defers_;  ///< only the loop of any number plans
     bool predicts_;

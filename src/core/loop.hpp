@@ -305,7 +305,7 @@ private:
         std::size_t events = 0, samples = 0, pieces = 0, next_sample = 0;
         std::size_t tentative = 0;  ///< number of steps that were not yet closed
         std::vector<double> phases{};
-        bool planned = false;       ///< the guards are left alone until their deadlines
+        bool planned = false;  ///< the guards are left alone until their deadlines
         bool newly_armed = false;
         bool everything = false;  ///< the members below are kept, too
         StepStart<X> start{};

@@ -333,7 +333,7 @@ Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double 
     constexpr double largest = 1e280;
     for (const double g : {lo.value, hi.value, lo.rate, hi.rate}) {
         if (std::fabs(g) > largest) [[unlikely]]
-            return Bisection{}.locate(path, lo, hi, tolerance);
+            return Toms748{}.locate(path, lo, hi, tolerance);
     }
     return Search(path, {lo, hi}, tolerance).run();
 }

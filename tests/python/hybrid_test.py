@@ -77,7 +77,7 @@ def test_a_thrown_ball_slides_on_where_it_rests():
     floor.reset = lambda t, y: [y[0], 0.0, y[2], -0.5 * y[3]]
     floor.rest = lambda t, y: [y[0], 0.0, y[2], 0.0]
     fly = lambda t, y: [y[2], y[3], 0.0, -10.0]
-    for method in ("dopri5", "fehlberg78", "rosenbrock4"):
+    for method in ("RK45", "DOP853"):
         result = ricochet.solve_ivp(fly, (0, 4), [0.0, 0.1, 1.0, 0.0], method=method, events=floor)
         assert result.kinds[0][-1] == "accumulation" and result.status == 0
         # sqrt(2 0.1 / 10) (1 + e) / (1 - e), with e = 0.5; x is the time, exact by any method
@@ -96,7 +96,7 @@ def test_a_reset_is_told_the_direction_of_its_crossing():
     wave = lambda t, x: np.sin(t)
     system = ricochet.System(lambda t, x: [0.0], [ricochet.Guard(wave, direction=0, reset=note,
                                                                  directed=True)])
-    run = ricochet.integrate(system, [0.0], (0.5, 10.0), max_step=0.5)
+    run = ricochet.integrate(system, [0.0], 10.0, t_start=0.5, h_max=0.5)
     assert seen == [-1, 1, -1] and run.x[0] == -1
     with pytest.raises(ValueError, match="found directed, expected a reset"):
         ricochet.integrate(ricochet.System(lambda t, x: [0.0], [
