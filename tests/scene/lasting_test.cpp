@@ -184,7 +184,8 @@ TEST(LastingContact, OfAPointNearTerrainIsNotFollowed)
     Scene scene({.gravity = {0, -g}});
     const MaterialId clay = scene.material({.restitution = 0.2, .friction = 0.4});
     scene.terrain({.points = {{-1, 1}, {0, 0}, {1, 1}}, .material = clay});
-    scene.point({.name = "dust", .at = {0.1, 1}, .material = clay});
+    // With drag it advances by steps; without, impacts bring it to rest in the corner.
+    scene.point({.name = "dust", .at = {0.1, 1}, .drag = 0.1, .material = clay});
     const SceneRun run = simulate(scene, {.t_end = 5, .contacts = scene_contacts()});
     EXPECT_EQ(run.outcome, Outcome::zeno);
     EXPECT_EQ(run.message,
