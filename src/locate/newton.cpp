@@ -49,15 +49,9 @@ constexpr int most_linear = 4;
     const double width = hi.s - lo.s;
     double size = 0;
     for (const double g : {lo.value, hi.value, lo.rate * width, hi.rate * width}) {
-        if (std::fabs(g) > size) size = std::fabs(g);
+        if (std::fabs(g) > size && std::isfinite(g)) size = std::fabs(g);
     }
     return size;
-}
-
-/// Change of the rate from one sample to the other, per second.
-[[nodiscard]] double bend(const GuardSample& a, const GuardSample& b) noexcept
-{
-    return std::fabs((b.rate - a.rate) / (b.s - a.s));
 }
 
 /// Newton's method in a bracket that every sample narrows.
@@ -70,6 +64,7 @@ public:
         if (std::isnan(bracket_.hi.rate)) path_.complete(bracket_.hi);
         size_ = detail::larger(detail::larger(0, bracket_.lo.value), bracket_.hi.value);
         scale_ = {.size = size_of(bracket_.lo, bracket_.hi), .h = bracket_.width()};
+        if (scale_.size > 1e280) unit_ = 0x1p-960;
         curvature_ = bend(bracket_.lo, bracket_.hi);
     }
 
@@ -88,6 +83,11 @@ private:
         return bracket_.contains(s) ? s : std::numeric_limits<double>::quiet_NaN();
     }
     [[nodiscard]] double reach() const noexcept { return straight_part * scale_.h; }
+    /// Change of the rate from one sample to the other, per second, in units of `1 / unit_`.
+    [[nodiscard]] double bend(const GuardSample& a, const GuardSample& b) const noexcept
+    {
+        return std::fabs((unit_ * b.rate - unit_ * a.rate) / (b.s - a.s));
+    }
 
     /// Whether the curvature that a straight line neglects over the correction shifts the root by
     /// less than is asked for.
@@ -96,7 +96,7 @@ private:
     {
         return distance <= std::min(width, std::max(reach(), finest)) &&
                distance * distance * curvature_ <=
-                   std::fabs(sample.rate) * std::max(finest, tolerance_) / 2;
+                   std::fabs(unit_ * sample.rate) * std::max(finest, tolerance_) / 2;
     }
     [[nodiscard]] bool ends_straight(const GuardSample& sample, double correction, Location& where);
     [[nodiscard]] bool close_in(const GuardSample& sample, double s, double& noise);
@@ -112,7 +112,8 @@ private:
     double end_;       ///< of the bracket at the start
     double size_ = 0;  ///< largest |g| among the samples at ends and by values
     detail::NoiseScale scale_;
-    double curvature_ = 0;  ///< largest change of the rate per second, between samples
+    double unit_ = 1;       ///< less where second differences of the guard would overflow
+    double curvature_ = 0;  ///< largest change of the rate per second, between samples, as `bend`
     int slow_ = 0;          ///< consecutive samples that have not halved the bracket
 };
 
@@ -266,8 +267,9 @@ bool Search::ends_straight(const GuardSample& sample, double correction, Locatio
 Location Search::run()
 {
     auto& [lo, hi] = bracket_;
-    const double u = detail::hermite_root(lo.value, lo.rate * scale_.h, hi.value,
-                                          hi.rate * scale_.h, path_.side() == Side::above ? 1 : -1);
+    const double u =
+        detail::hermite_root(unit_ * lo.value, unit_ * lo.rate * scale_.h, unit_ * hi.value,
+                             unit_ * hi.rate * scale_.h, path_.side() == Side::above ? 1 : -1);
     double s = lo.s + scale_.h * u;
     if (path_.foretells()) s = refined(s, u);
     double past = 0;
@@ -328,13 +330,6 @@ Location Search::run()
 
 Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
 {
-    // Second differences over the narrowest brackets, which the steps of Newton's method are judged
-    // by, would overflow.
-    constexpr double largest = 1e280;
-    for (const double g : {lo.value, hi.value, lo.rate, hi.rate}) {
-        if (std::fabs(g) > largest) [[unlikely]]
-            return Toms748{}.locate(path, lo, hi, tolerance);
-    }
     return Search(path, {lo, hi}, tolerance).run();
 }
 
