@@ -86,7 +86,7 @@ class Ball(ricochet.System):
     unilateral = True
 
     def flow(self, t, x):
-        return fall(t, x) if x[0] > 0 or x[1] != 0 else np.zeros(2)
+        return fall(t, x)
 
     def guard(self, t, x):
         return x[0]
