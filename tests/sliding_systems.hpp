@@ -13,6 +13,17 @@
 
 namespace ricochet {
 
+/// Times of the events of one kind.
+template <class Events>
+[[nodiscard]] std::vector<double> times_of(const Events& events, EventKind kind)
+{
+    std::vector<double> times;
+    for (const auto& event : events) {
+        if (event.kind == kind) times.push_back(event.t);
+    }
+    return times;
+}
+
 template <std::size_t N>
 struct OwnGuard {
     GuardInfo info;

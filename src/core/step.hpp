@@ -15,10 +15,10 @@
 #include <vector>
 
 #include "core/held_flow.hpp"
+#include "core/phase_table.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/detail/instant.hpp"
-#include "ricochet/detail/phase_table.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/detail/system_table.hpp"
 #include "ricochet/integrate/options.hpp"

@@ -13,9 +13,9 @@
 #include <span>
 #include <vector>
 
+#include "../core/phase_table.hpp"
 #include "ricochet/detail/branch_phases.hpp"
 #include "ricochet/detail/hand_over_run.hpp"
-#include "ricochet/detail/phase_table.hpp"
 
 namespace ricochet::detail {
 

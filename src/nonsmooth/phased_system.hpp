@@ -26,9 +26,9 @@
 #include <utility>
 #include <vector>
 
+#include "../core/phase_table.hpp"
 #include "phase_rules.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detail/phase_table.hpp"
 #include "ricochet/detail/phased_run.hpp"
 #include "ricochet/detail/refusals.hpp"
 

@@ -1,5 +1,4 @@
-// Compiled with assertions, as by whoever gives no NDEBUG: those of Eigen see a state of a wrong
-// size.
+// Compiled with assertions, as without NDEBUG: those of Eigen see a state of a wrong size.
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>

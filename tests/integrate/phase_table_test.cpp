@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
+#include "core/phase_table.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detail/phase_table.hpp"
 #include "ricochet/ricochet.hpp"
 
 namespace ricochet::detail {

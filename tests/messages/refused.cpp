@@ -242,6 +242,11 @@ struct OtherFlow {
     void Flow(double, const X& x, X& dxdt) const { dxdt = x; }
 };
 
+/// The inclusion would be ignored.
+struct SetValued : Falling {
+    int set_valued() const { return 0; }
+};
+
 struct Stateless {
     void flow(double, const X& x, X& dxdt) const { dxdt = x; }
 };
@@ -343,6 +348,15 @@ int main()
         return Metered(gate).metering().piece > 0;
     };
     (void)measure;
+// CASE 51 alone: found a system with set_valued(); expected the target to link ricochet::nonsmooth
+#elif CASE == 51
+    EventMonitor monitor(SetValued{}, x0);
+// CASE 52 alone: found a system with set_valued(); expected the target to link ricochet::nonsmooth
+#elif CASE == 52
+    (void)integrate(SetValued{}, x0, {.t_end = 1});
+// CASE 53 alone: found a system with set_valued(); expected the target to link ricochet::nonsmooth
+#elif CASE == 53
+    Simulation simulation(SetValued{}, x0, {.t_end = 1});
 // CASE 18: compiled with -ffast-math or -ffinite-math-only
 #else
     (void)integrate(System{}, x0, {.t_end = 1});

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
 #include <vector>
 
 #include "ricochet/ricochet.hpp"
@@ -20,16 +21,6 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 [[nodiscard]] Options until(double t_end)
 {
     return {.t_end = t_end, .rtol = 1e-10, .atol = 1e-12};
-}
-
-template <class Events>
-[[nodiscard]] std::vector<double> times_of(const Events& events, EventKind kind)
-{
-    std::vector<double> times;
-    for (const auto& event : events) {
-        if (event.kind == kind) times.push_back(event.t);
-    }
-    return times;
 }
 
 [[nodiscard]] GuardInfo bounding()
@@ -178,6 +169,39 @@ TEST(PhasesOfSizes, AVetoOfAnImpactOutlastsAStick)
     ASSERT_EQ(sticks.size(), 1U);
     EXPECT_NEAR(sticks[0], 2, tolerance);
     EXPECT_NEAR(run.x[1], -3.375, tolerance);
+}
+
+/// A body that two contacts hold at once, with bounds 1 and 3, under the load t.
+struct TwoContacts {
+    using State = std::array<double, 1>;
+
+    struct Motion {
+        static constexpr int state_size = 1, reaction_size = 2;
+        using Vector = Eigen::Matrix<double, 1, 1>;
+        using Reaction = Eigen::Vector2d;
+
+        static void smooth(double t, const Vector&, Vector& out) { out[0] = t; }
+        static void observe(Eigen::Matrix<double, 2, 1>& e) { e << 1, 1; }
+        static void act(Eigen::Matrix<double, 1, 2>& g) { g << 1, 1; }
+        static sets::Box<2> reaction_set(double, const Vector&)
+        {
+            return sets::Box<2>({-1, -3}, {1, 3});
+        }
+    };
+
+    static void flow(double t, const State& x, State& dxdt) { dxdt[0] = t - (x[0] >= 0 ? 4 : -4); }
+    static double guard(double, const State& x) { return x[0]; }
+    static GuardInfo guard_info() { return {.crossing = Crossing::either, .resets = false}; }
+    static Motion set_valued() { return {}; }
+};
+
+// It slips at 4: v(6) = 2. The run in parts is of the order of its steps, here 2e-6 at 6.
+TEST(PhasesOfSizes, ReactionsOfTheSameMotionAreFollowedByIntegrateAlone)
+{
+    const auto run = integrate(TwoContacts{}, {0.0}, until(6));
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_NEAR(run.x[0], 2, 1e-5);
+    EXPECT_THROW(Simulation(TwoContacts{}, {0.0}, until(6)), std::invalid_argument);
 }
 
 }  // namespace

@@ -84,16 +84,6 @@ template <class Events>
     }
     return times;
 }
-template <class Events>
-[[nodiscard]] std::vector<double> times_of(const Events& events, EventKind kind)
-{
-    std::vector<double> times;
-    for (const auto& event : events) {
-        if (event.kind == kind) times.push_back(event.t);
-    }
-    return times;
-}
-
 void expect_times(const std::vector<double>& found, const std::vector<double>& expected,
                   double error = tolerance)
 {

@@ -325,6 +325,22 @@ public:
         if (traits().moves) inclusion_.offset(t, s);
     }
 
+    /// Subtracts s'(t); where the system does not give it, by a central difference.
+    void subtract_offset_rate(double t, Reaction& rate) const
+    {
+        if (traits().gives_offset_rate) {
+            Reaction declared = Reaction::Zero(reactions());
+            inclusion_.offset_rate(t, declared);
+            rate -= declared;
+        } else if (traits().moves) {
+            const double step = 1e-5 * std::max(1.0, std::abs(t));
+            Reaction ahead, behind;
+            offset(t + step, ahead);
+            offset(t - step, behind);
+            rate -= (ahead - behind) / (2 * step);
+        }
+    }
+
     /// y = E w - s(t).
     void observed(double t, const State& w, Reaction& y) const
     {

@@ -12,6 +12,7 @@
 
 #include "ricochet/detail/branch_modes.hpp"
 #include "ricochet/detail/branch_phases.hpp"
+#include "ricochet/detail/false_position.hpp"
 #include "ricochet/detail/held_reactions.hpp"
 #include "ricochet/detail/law.hpp"
 #include "ricochet/detail/minimal_selection.hpp"
@@ -57,17 +58,7 @@ public:
     {
         const auto& m = matrices();
         Reaction rate = times(m.observe(), vector(dxdt));
-        if (m.traits().gives_offset_rate) {
-            Reaction declared = Reaction::Zero(M);
-            m.inclusion().offset_rate(t, declared);
-            rate -= declared;
-        } else if (m.traits().moves) {
-            const double step = 1e-5 * std::max(1.0, std::abs(t));
-            Reaction ahead, behind;
-            m.offset(t + step, ahead);
-            m.offset(t - step, behind);
-            rate -= (ahead - behind) / (2 * step);
-        }
+        m.subtract_offset_rate(t, rate);
         write(rate, rates, reactions());
     }
     [[nodiscard]] double size_of_row(std::size_t i, const double* x) const override
@@ -277,7 +268,7 @@ public:
             const double low = 1e-6 * high;
             const double at_low = slack_after(low);
             if (!(at_high < 0) || !(at_low > 0)) return h;  // across all changes
-            high = find(low, at_low, high, at_high, slack_after);
+            high = false_position(low, at_low, high, at_high, 0, slack_after);
             if (!(high > 0) || !solve(high, located_.end, &b)) return h;
         }
         located_.valid = true;
@@ -555,32 +546,6 @@ private:
         to_.w = w;
         (void)select(to_);  // else the solver's reaction is kept
         return branches_of(to_);
-    }
-
-    /// A root between low and high, by the Illinois variant of false position, halved where it
-    /// stagnates; 0 where a value is not a number.
-    template <class Function>
-    [[nodiscard]] static double find(double low, double at_low, double high, double at_high,
-                                     const Function& function)
-    {
-        const double floor = 4 * std::numeric_limits<double>::epsilon() * high;
-        for (int i = 0; i < 200 && high - low > floor && at_high != 0; ++i) {
-            double middle = (low * at_high - high * at_low) / (at_high - at_low);
-            if (i % 3 == 2 || !(middle > low && middle < high)) middle = low + (high - low) / 2;
-            if (!(middle > low && middle < high)) break;
-            const double value = function(middle);
-            if (std::isnan(value)) return 0;
-            if ((value < 0) == (at_high < 0)) {
-                high = middle;
-                at_high = value;
-                at_low /= 2;
-            } else {
-                low = middle;
-                at_low = value;
-                at_high /= 2;
-            }
-        }
-        return high;
     }
 
     BranchPhasesOptions options_;

@@ -111,17 +111,7 @@ struct RICOCHET_ALIGNED SelectionStart {
         m.observed(t, w, y);
         m.offset(t, s);
         rate = times(m.observe(), times(m.inverse_mass(), f));
-        if (m.traits().gives_offset_rate) {
-            Reaction declared = Reaction::Zero(m.reactions());
-            inclusion.offset_rate(t, declared);
-            rate -= declared;
-        } else if (m.traits().moves) {
-            const double step = 1e-5 * std::max(1.0, std::abs(t));
-            Reaction ahead, behind;
-            m.offset(t + step, ahead);
-            m.offset(t - step, behind);
-            rate -= (ahead - behind) / (2 * step);
-        }
+        m.subtract_offset_rate(t, rate);
         delassus = times(m.observe(), times(m.inverse_mass(), m.act()));
         size = times(m.observe().cwiseAbs(), w.cwiseAbs()) + s.cwiseAbs();
     }

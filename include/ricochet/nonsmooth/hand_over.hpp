@@ -572,6 +572,13 @@ public:
     LoopOf(const System& system, Parts& parts, const X& x0, const Options& options)
         : run_(make_phased_run<C>(setup(system, parts, options), core_state(x0), options))
     {
+        if constexpr (!has_one_reaction<System>()) {
+            if (reactions_depend(system)) {
+                refuse_inclusion(
+                    "reactions that act on the same motion are followed by integrate "
+                    "alone");
+            }
+        }
     }
     [[nodiscard]] AnyLoop<C>* operator->() const noexcept { return &run_->loop(); }
     [[nodiscard]] const PhasedRun<C>& phased() const noexcept { return *run_; }

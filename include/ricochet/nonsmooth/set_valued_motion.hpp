@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "ricochet/detail/composite_step.hpp"
+#include "ricochet/detail/false_position.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
 #include "ricochet/detail/padded_motion.hpp"
 #include "ricochet/integrate/run.hpp"
@@ -176,8 +177,8 @@ public:
     [[nodiscard]] std::optional<State> locate(const Function& g, double tolerance = 0)
     {
         State at = now_;
-        const double width =
-            find(0, g(before_), now_.t - before_.t, g(now_), tolerance, [&](double h) {
+        const double width = detail::false_position(
+            0, g(before_), now_.t - before_.t, g(now_), tolerance, [&](double h) {
                 return step_.take(before_, h, at).converged
                            ? g(std::as_const(at))
                            : std::numeric_limits<double>::quiet_NaN();
@@ -325,40 +326,13 @@ private:
         double at_low = slack_after(1e-6 * high);
         low = 1e-6 * high;
         if (!(at_high < 0) || !(at_low > 0)) return whole;
-        const double width = find(low, at_low, high, at_high, 0, slack_after);
+        const double width = detail::false_position(low, at_low, high, at_high, 0, slack_after);
         if (!(width > 0)) return whole;
         StageReport report = counted(step_.take(now_, width, half_, &start_branches_));
         if (!report.converged) return whole;
         trial_ = half_;
         switched_ = true;
         return report;
-    }
-
-    /// Finds a root of `function` between low and high, whose values have opposite signs, by the
-    /// Illinois variant of false position, halved if it stagnates. Zero if none exists.
-    template <class Function>
-    [[nodiscard]] static double find(double low, double at_low, double high, double at_high,
-                                     double tolerance, const Function& function)
-    {
-        if (!(at_low * at_high <= 0)) return 0;
-        const double floor = std::max(tolerance, 4 * std::numeric_limits<double>::epsilon() * high);
-        for (int i = 0; i < 200 && high - low > floor && at_high != 0; ++i) {
-            double middle = (low * at_high - high * at_low) / (at_high - at_low);
-            if (i % 3 == 2 || !(middle > low && middle < high)) middle = low + (high - low) / 2;
-            if (!(middle > low && middle < high)) break;
-            const double value = function(middle);
-            if (std::isnan(value)) return 0;
-            if ((value < 0) == (at_high < 0)) {
-                high = middle;
-                at_high = value;
-                at_low /= 2;
-            } else {
-                low = middle;
-                at_low = value;
-                at_high /= 2;
-            }
-        }
-        return high;
     }
 
     void accept(bool last)

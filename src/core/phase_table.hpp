@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Phases of a run whose motion is not always that of the system's flow, as a table of pointers.
 //
 // A mode of such a run is a mode of the system and, in the bits above it, the kind of phase: kind 0
