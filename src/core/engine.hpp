@@ -26,6 +26,7 @@
 
 #include "core/event_search.hpp"
 #include "core/guard_bank.hpp"
+#include "core/guard_life.hpp"
 #include "core/merged_resets.hpp"
 #include "core/metering.hpp"
 #include "core/planner.hpp"
@@ -757,9 +758,12 @@ protected:
         return side != Side::plateau && !counts(side, crossing);
     }
 
-    /// Fires guard i, just armed at the start, if it asks for it there; else counts it if it is
-    /// beyond its surface.
-    void fire_at_start(std::size_t i);
+    /// Arms guard i at the start of a run, where it may have an event.
+    void arm_one_at_start(std::size_t i, bool begins);
+
+    /// Puts guard i into the next set, or records its event if that is all.
+    /// @param from  the side that it has left
+    void have_event(std::size_t i, Arming arming, Side from);
 
     /// Fires guard i because its condition holds, not because of a crossing.
     void fire_by_condition(std::size_t i);
@@ -789,18 +793,32 @@ protected:
     void arm_all();
 
     /// Returns false if the run has ended.
+    /// @param widest  largest error among the guards of the set
+    /// @param opens   `ends_veto`
     [[nodiscard]] bool arm_one(std::size_t i, double widest, bool opens);
+
+    /// What is seen of a guard where it is armed.
+    struct Seen {
+        Side side = Side::plateau;  ///< on which it lies, or to which it heads from its surface
+        bool on = false;            ///< it is on its surface
+        bool set_off = false;       ///< `leaves_at_once`
+    };
+    [[nodiscard]] Seen see(std::size_t i, Side before, double widest, bool opens);
+    [[nodiscard]] bool is_now_set_off(std::size_t i, Side head)
+    {
+        return counts(opposite(head), std::as_const(bank_)[i].info.crossing) &&
+               leaves_at_once(i, head);
+    }
+    [[nodiscard]] unsigned facts_of(const GuardRecord& record, Side from,
+                                    const Seen& seen) const noexcept
+    {
+        return declared_of(record.info, resets_any_ && record.info.resets, record.acting) |
+               seen_of(from, seen.side, seen.on, record.info.crossing) |
+               (seen.set_off ? is_set_off : 0u);
+    }
     /// Whether a time event has ended the veto of guard i, which lies on its surface: a guard that
     /// was passed is armed beyond.
     [[nodiscard]] bool ends_veto(std::size_t i);
-
-    /// Side from which a departure counts; `else_side` if a departure from either side does.
-    [[nodiscard]] static constexpr Side side_left_by(Crossing crossing, Side else_side) noexcept
-    {
-        return crossing == Crossing::falling  ? Side::above
-               : crossing == Crossing::rising ? Side::below
-                                              : else_side;
-    }
 
     /// Whether guard i, on its surface at x⁻ and at x⁺ and about to enter `side`, has its event
     /// here: the set has changed the mode (or a sign in the state that the guard reads, if it

@@ -36,10 +36,13 @@ template <class X, bool single>
 inline void EventEngine<X, single>::keep_suspects()
 {
     kept_.guards.clear();
-    for (const std::size_t i : bank_.suspects()) {
-        if (!is_member(i)) kept_.guards.push_back(bank_.keep(i));
+    kept_.notes.clear();
+    if (!single || search_.fired().empty()) {
+        for (const std::size_t i : bank_.suspects()) {
+            if (!is_member(i)) kept_.guards.push_back(bank_.keep(i));
+        }
     }
-    kept_.notes = search_.notes();
+    if (!search_.notes().empty()) kept_.notes = search_.notes();
     kept_.disabled = run_.statistics.disabled;
     kept_.disabled_in_search = search_.disabled;
     kept_.uses_space = !kept_.guards.empty() || (system_->enabled_at && !kept_.notes.empty());

@@ -133,46 +133,53 @@ inline void EventEngine<X, single>::arm_at_start(bool begins)
     bank_.sample_start(step_, calls(), h_next_);
     bank_.keep_armed_values();
     for (std::size_t i = 0; i < bank_.size(); ++i) {
-        const GuardRecord& record = bank_[i];
-        const double g = bank_.g0(i);
-        if (!record.enabled) continue;
-        if (!std::isfinite(g)) {
-            throw_start_guard_not_finite(who_, i, record.info.name, options_.t_start, g);
-        }
-        const bool on_surface = g == 0 || (record.info.unilateral && g < 0 && -g <= rounding_of(i));
-        if (record.info.unilateral && g < 0 && !on_surface && is_enabled_here(i)) {
-            throw_start_outside_mode(who_, i, record.info.name, options_.t_start, g);
-        }
-        if (on_surface) bank_[i].band = std::fabs(g);
-        bank_[i].departs = on_surface;
-        bank_.arm(i, on_surface ? heading(i) : side_of(g));
-        if (record.side == Side::plateau) {
-            bank_.await(i, record.info.unilateral ? Side::above : Side::plateau);
-        }
-        if (record.info.unilateral && record.side == Side::below) {
-            if (on_surface && counts_here(i)) search_.fired().push_back(i);
-        } else if (begins) {
-            fire_at_start(i);
-        }
+        if (std::as_const(bank_)[i].enabled) arm_one_at_start(i, begins);
     }
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::fire_at_start(std::size_t i)
+inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
 {
-    const GuardRecord& record = std::as_const(bank_)[i];
-    const bool fires = record.info.at_start && !counts(record.side, record.info.crossing);
-    if (!fires) {
-        if (record.acting && is_beyond(record.side, record.info.crossing)) count_armed_beyond(i);
-        return;
+    GuardRecord& record = bank_[i];
+    const GuardInfo& info = record.info;
+    const double g = bank_.g0(i);
+    if (!std::isfinite(g)) throw_start_guard_not_finite(who_, i, info.name, options_.t_start, g);
+    const bool on = g == 0 || (info.unilateral && g < 0 && -g <= rounding_of(i));
+    if (on) record.band = std::fabs(g);
+    record.departs = on;
+    const Side side = on ? heading(i) : side_of(g);
+    const bool asks_here = begins && info.at_start && !counts(side, info.crossing);
+    const Arming arming = arming_of(
+        Cause::start, facts_of(record, Side::plateau, {side, on}) | (asks_here ? asks : 0u));
+    if (arming == Arming::outside && is_enabled_here(i)) {
+        throw_start_outside_mode(who_, i, info.name, options_.t_start, g);
     }
-    if (counts_here(i)) fire_by_condition(i);
+    bank_.arm(i, side);
+    if (side == Side::plateau)
+        bank_.await(i, awaited_side(Cause::start, info, record.acting, side));
+    if (arming == Arming::waits) {
+        if (begins && record.acting && is_beyond(side, info.crossing)) count_armed_beyond(i);
+    } else if (arming != Arming::outside && counts_here(i)) {
+        have_event(i, arming, side);
+    }
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::have_event(std::size_t i, Arming arming, Side from)
+{
+    if (arming == Arming::by_condition) {
+        fire_by_condition(i);
+    } else if (std::as_const(bank_)[i].acting) {
+        search_.fired().push_back(i);
+    } else {
+        record_jump(i, from);
+    }
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::fire_by_condition(std::size_t i)
 {
-    const Side inside = side_left_by(bank_[i].info.crossing, Side::plateau);
+    const Side inside = bank_[i].info.crossing == Crossing::falling ? Side::above : Side::below;
     if (bank_[i].acting) {
         bank_.arm(i, opposite(inside));
         search_.fired().push_back(i);
@@ -243,7 +250,46 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
         end(Outcome::non_finite, i);
         return false;
     }
+    const Crossing crossing = record.info.crossing;
     const Side before = record.side != Side::plateau ? record.side : record.awaited;
+    const Seen seen = see(i, before, widest, opens);
+    const Side side = seen.side;
+    const Cause cause = record.fired           ? Cause::fired
+                        : record.newly_enabled ? Cause::enabled
+                        : opens                ? Cause::opened
+                                               : Cause::stood;
+    record.departs = seen.on || record.fired || record.newly_enabled;
+    bank_.arm(i, side);
+    record.from = 0;
+    if (side == Side::plateau) {
+        bank_.await(i, awaited_side(cause, record.info, record.acting, before));
+    }
+    if (changed_mode_ && located_ && crossing == Crossing::either && record.fired &&
+        record.acting && side == before && side != Side::plateau) {
+        ++run_.statistics.either_relays;
+        run_.statistics.relay_guard = i;
+    }
+    // At its own event inside a step the guard was armed on the side that it has left.
+    const Side from = record.fired && located_ ? opposite(before) : before;
+    const bool asks_here = record.newly_enabled && fires_at_entry(i);
+    const Arming arming = arming_of(cause, facts_of(record, from, seen) | (asks_here ? asks : 0u));
+    const bool has_event = arming == Arming::fires || arming == Arming::by_condition;
+    if (has_event && counts_here(i)) {
+        have_event(i, arming, before);
+    } else if (record.newly_enabled && record.acting && is_beyond(side, crossing)) {
+        count_armed_beyond(i);
+    }
+    const bool outside = arming == Arming::outside && is_enabled_here(i);
+    if (outside) end(Outcome::outside_mode, i);
+    return !outside;
+}
+
+template <class X, bool single>
+inline auto EventEngine<X, single>::see(std::size_t i, Side before, double widest, bool opens)
+    -> Seen
+{
+    GuardRecord& record = bank_[i];
+    const double g = bank_.g0(i);
     if (record.fired && record.estimated && std::fabs(g) > record.band) {
         record.band = record.noted.value;
     }
@@ -251,63 +297,18 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
     const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
     const bool rounded = std::fabs(g) > band && is_flipped_by_rounding(i, before);
     if (rounded || opens) record.band = std::fabs(g);
-    bool on_surface = rounded || opens || std::fabs(g) <= band;
-    Side side = on_surface ? heading(i) : side_of(g);
-    const Crossing crossing = record.info.crossing;
-    bool leaves = on_surface && counts(opposite(side), crossing) && leaves_at_once(i, side);
-    if (!on_surface && changed_mode_ && stays_within_rounding(i)) {
+    if (rounded || opens || std::fabs(g) <= band) {
         const Side head = heading(i);
-        leaves = counts(opposite(head), crossing) && leaves_at_once(i, head);
-        if (leaves) {
+        return {head, true, is_now_set_off(i, head)};
+    }
+    if (changed_mode_ && stays_within_rounding(i)) {
+        const Side head = heading(i);
+        if (is_now_set_off(i, head)) {
             record.band = std::fabs(g);
-            on_surface = true;
-            side = head;
+            return {head, true, true};
         }
     }
-    record.departs = on_surface || record.fired || record.newly_enabled;
-    bank_.arm(i, side);
-    record.from = 0;
-    if (side == Side::plateau) {
-        const bool begins = record.newly_enabled && record.acting;
-        const Side from = record.info.unilateral ? Side::above
-                          : begins               ? side_left_by(record.info.crossing, before)
-                                                 : before;
-        bank_.await(i, record.fired && !record.info.unilateral ? Side::plateau : from);
-    }
-    const bool kept_out = record.info.unilateral && side == Side::below;
-    const bool flipped =
-        side != Side::plateau && side == opposite(before) && counts(before, record.info.crossing);
-    const bool pressed = kept_out && on_surface;
-    if (changed_mode_ && located_ && crossing == Crossing::either && record.fired &&
-        record.acting && side == before && side != Side::plateau) {
-        ++run_.statistics.either_relays;
-        run_.statistics.relay_guard = i;
-    }
-    const bool arrived = on_surface && counts(opposite(side), record.info.crossing);
-    // A fired guard without a reset may have been carried back by the reset of another.
-    const Side at_set = located_ ? opposite(before) : before;
-    const bool carried_back = !(resets_any_ && record.info.resets) && !on_surface &&
-                              side == opposite(at_set) && counts(at_set, record.info.crossing);
-    const bool enters = record.newly_enabled && fires_at_entry(i);
-    const bool fires = leaves || enters                ? true
-                       : record.fired                  ? pressed || carried_back
-                       : record.newly_enabled || opens ? record.acting && (arrived || pressed)
-                                                       : flipped;
-    if (fires && counts_here(i)) {
-        if (enters) {
-            fire_by_condition(i);
-        } else if (record.acting) {
-            search_.fired().push_back(i);
-        } else {
-            record_jump(i, before);
-        }
-    } else if (record.newly_enabled && record.acting && is_beyond(side, crossing)) {
-        count_armed_beyond(i);
-    }
-    const bool is_new = record.fired || record.newly_enabled;
-    const bool outside = kept_out && !on_surface && g < 0 && is_new && is_enabled_here(i);
-    if (outside) end(Outcome::outside_mode, i);
-    return !outside;
+    return {side_of(g), false, false};
 }
 
 template <class X, bool single>
