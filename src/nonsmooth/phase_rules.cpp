@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 #include "ricochet/detail/event_loop.hpp"
 
@@ -171,6 +172,7 @@ Kind PhaseRules::enter(double t, double* x)
     const Kind kind = clear ? own : kind_for(inclusion_.start(t, x), t, x, PhaseCause::start);
     note_sides(t, x);
     note(kind, t, PhaseCause::start);
+    begins_ = true;
     return kind;
 }
 
@@ -305,7 +307,16 @@ Kind PhaseRules::decide_implicit(const Set& set, double* x)
         return implicit_in(b);
     }
     if (!moves && !(set.on_time && inclusion_.jumps(set.t, x))) return set.kind;
-    Mode b = 0;
+    Mode b = branches_before(set);
+    // A y that the set has left alone is as much at zero as it was, but for the rounding of steps.
+    double size = 0;
+    for (std::size_t c = 0; c < inclusion_.size(); ++c) size = std::fmax(size, std::fabs(x[c]));
+    for (std::size_t i = 0; i < count(); ++i) {
+        const bool is_held = BranchPhases::branch(i, b) == Branch::inside;
+        const bool stays = y_[i] == y_before_[i] && (is_held || std::fabs(y_[i]) <= 1e-14 * size);
+        b = BranchPhases::with_branch(i, stays ? Branch::inside : Branch::lower, b);
+    }
+    inclusion_.hold(b, set.t, x);
     if (!inclusion_.select(set.t, x, b)) return end_with(Outcome::not_converged);
     memory_.across = b;
     return set.kind == across() ? across() : implicit_in(b);
@@ -423,6 +434,11 @@ PhaseRules::Verdict PhaseRules::review(const Step& step, double* x)
         return {PhaseVerdict::Kind::ends, step.kind, 0, static_cast<Outcome>(memory_.outcome)};
     }
     note_sides(step.t, x);
+    // The first step of a run is that of its flow, which says nothing of implicit steps.
+    const bool begins = std::exchange(begins_, false);
+    if (begins && is_implicit(step.kind)) {
+        return {PhaseVerdict::Kind::changes, step.kind, options_.step};
+    }
     if (has_own_guards(step.kind)) return review_own(step, x);
     if (is_explicit(step.kind)) return review_explicit(step.kind, step.t, x);
     return review_implicit(step.kind, step.t, step.has_advanced, x);

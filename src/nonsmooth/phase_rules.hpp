@@ -261,6 +261,7 @@ private:
     mutable std::vector<double> branch_guards_;
     std::vector<ReactionChange> changes_;
     std::vector<Phase> phases_;
+    bool begins_ = false;                   ///< no step has been taken since the start
     PhaseCause cause_ = PhaseCause::start;  ///< why the phase that was entered last began
     std::uint64_t implicit_steps_ = 0;
 };

@@ -284,14 +284,17 @@ public:
         ++attempts_;
         place(from);
         from_is_to_ = from_;
-        const bool stays = stays_in_branches(from, h);
+        bool stays = stays_in_branches(from, h);
         const bool to_end = stays && h == located_.length;
         const Branches b = Modes::branches_of(from.branches);
         if (to_end) {
             to_ = located_.end;
-        } else if (!solve(h, to_, stays ? &b : nullptr)) {
-            return false;
+        } else if (stays) {
+            // A y that has returned by the end of the step that was looked at may be away here.
+            stays = solve(h, to_, &b) && step_.slack(to_, b) >= 0;
+            located_.valid = stays;
         }
+        if (!stays && !solve(h, to_, nullptr)) return false;
         change_ = to_end && located_.change;
         crossed_ = !stays && !from.crosses;
         if (crossed_) {  // a change that was not located shows at the end
@@ -306,7 +309,9 @@ public:
     {
         place(from);
         const Branches b = Modes::branches_of(from.branches);
-        if (!solve(s, probe_, stays_in_branches(from, h) ? &b : nullptr)) {
+        // Held reactions that depend on one another are not always determined in their branches.
+        const bool stays = stays_in_branches(from, h) && solve(s, probe_, &b);
+        if (!stays && !solve(s, probe_, nullptr)) {
             probe_.w.setConstant(std::numeric_limits<double>::quiet_NaN());
             probe_.reaction.setZero(M);
         }

@@ -528,28 +528,6 @@ template <class System, class X, class Stepping, class Detector>
     return false;
 }
 
-template <class System>
-[[nodiscard]] consteval bool has_one_reaction()
-{
-    return reaction_size<
-               std::remove_cvref_t<decltype(std::declval<const System&>().set_valued())>> == 1;
-}
-
-/// Whether reactions act on the same motion, so that they are not determined: such systems run in
-/// parts.
-template <class System>
-[[nodiscard]] bool reactions_depend(const System& system)
-{
-    using Set = std::remove_cvref_t<decltype(system.set_valued())>;
-    constexpr int N = solver_components<state_size<Set>, reaction_size<Set>>;
-    constexpr int M = solver_reactions<state_size<Set>, reaction_size<Set>>;
-    const AnyMatrices<N, M> m(solver_inclusion(Set(system.set_valued())));
-    const Eigen::Index own = m.own_reactions();
-    Eigen::MatrixXd w = m.observe() * (m.inverse_mass() * m.act());
-    w = w.topLeftCorner(own, own).eval();
-    return invert(w, w) < own;
-}
-
 /// The loop of a system with set_valued().
 template <class System, class X, class Stepping, class Detector>
 requires(KnowsInclusion<System>) class LoopOf<System, X, Stepping, Detector> {
@@ -572,13 +550,6 @@ public:
     LoopOf(const System& system, Parts& parts, const X& x0, const Options& options)
         : run_(make_phased_run<C>(setup(system, parts, options), core_state(x0), options))
     {
-        if constexpr (!has_one_reaction<System>()) {
-            if (reactions_depend(system)) {
-                refuse_inclusion(
-                    "reactions that act on the same motion are followed by integrate "
-                    "alone");
-            }
-        }
     }
     [[nodiscard]] AnyLoop<C>* operator->() const noexcept { return &run_->loop(); }
     [[nodiscard]] const PhasedRun<C>& phased() const noexcept { return *run_; }
@@ -664,14 +635,9 @@ requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
     static_assert(detail::nonsmooth_is_linked<System>,
                   "ricochet: found a system with set_valued(), and a target that does not link "
                   "ricochet::nonsmooth; expected it to, or RICOCHET_WITH_NONSMOOTH to be defined");
-    constexpr bool in_phases = detail::runs_in_phases<System, X, Stepping, Detector>();
-    constexpr bool one_reaction = detail::has_one_reaction<System>();
-    if constexpr (in_phases) {
-        if (one_reaction || !detail::reactions_depend(system)) {
-            return detail::run_in_phases(system, x0, options, stepping, detector, locator);
-        }
-    }
-    if constexpr (!(in_phases && one_reaction)) {
+    if constexpr (detail::runs_in_phases<System, X, Stepping, Detector>()) {
+        return detail::run_in_phases(system, x0, options, stepping, detector, locator);
+    } else {
         return EventHandOver<System, X, Stepping, Detector, Locator>(system, x0, options, stepping,
                                                                      detector, locator)
             .take();

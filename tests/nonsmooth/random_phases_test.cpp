@@ -1,0 +1,115 @@
+// Random inclusions beside events that have nothing to do with them: the events come when they have
+// to, and the motion of the inclusion does not notice them.
+
+#include "random_phases.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/ricochet.hpp"
+
+namespace ricochet::random_phases_test {
+namespace {
+
+using test::InclusionFamily;
+using test::random_inclusion;
+using test::RandomInclusion;
+using test::WithSawtooth;
+
+using State = std::array<double, 6>;
+
+/// Implicit steps, a thousandth of the run each, are of order two, but of order one across changes
+/// that are not located: as for `ReferenceMotion::allowed`, a thousandth of the motion, or its
+/// change in two steps.
+constexpr double of_motion = 1e-3;
+
+template <int M>
+[[nodiscard]] Options options_of(const WithSawtooth<M>& system)
+{
+    return {.t_end = system.inclusion.t_end, .rtol = 1e-9, .atol = 1e-11};
+}
+
+template <class Run, int M>
+void expect_teeth(const Run& run, const WithSawtooth<M>& system)
+{
+    const std::vector<double> expected = system.expected();
+    const bool stops = expected.size() == system.teeth;
+    EXPECT_EQ(run.outcome, stops ? Outcome::stopped_by_event : Outcome::reached_end);
+    std::vector<double> found;
+    for (const auto& event : run.events) {
+        if (event.guard == 0 && event.kind != EventKind::time) found.push_back(event.t);
+    }
+    ASSERT_EQ(found.size(), expected.size());
+    // The sawtooth is linear, and exact in every kind of step; 1e-9 holds the solver's tolerance.
+    for (std::size_t k = 0; k < found.size(); ++k) {
+        EXPECT_NEAR(found[k], expected[k], 1e-9 * system.inclusion.t_end);
+    }
+}
+
+/// The motion of the inclusion alone up to t, by steps five times as short.
+template <int M>
+void expect_motion_of_inclusion(const State& x, double t, const RandomInclusion<M>& inclusion)
+{
+    HandOverOptions options{.t_end = t, .rtol = 1e-9, .atol = 1e-11};
+    options.set_valued.step = inclusion.t_end / 5000;
+    const auto alone = hand_over(inclusion, inclusion.start, options);
+    ASSERT_EQ(alone.outcome, Outcome::reached_end);
+    Eigen::Matrix<double, 6, 1> rate;
+    inclusion.smooth(t, alone.state.w, rate);
+    rate += inclusion.lever * alone.state.reaction;
+    rate[4] = 0;
+    const double h = inclusion.t_end / 1000;
+    const double allowed = std::max({of_motion * alone.state.w.cwiseAbs().maxCoeff(),
+                                     2 * h * rate.cwiseAbs().maxCoeff(), of_motion});
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        if (i != 4) EXPECT_NEAR(x[i], alone.state.w[static_cast<Eigen::Index>(i)], allowed) << i;
+    }
+}
+
+template <int M>
+void follow(const RandomInclusion<4>& full, std::uint64_t seed)
+{
+    const auto system = WithSawtooth<M>::make(test::without_unused<M>(full), seed);
+    State x0;
+    for (std::size_t i = 0; i < 6; ++i) x0[i] = full.start[static_cast<Eigen::Index>(i)];
+    const auto run = integrate(system, x0, options_of(system));
+    expect_teeth(run, system);
+    expect_motion_of_inclusion(run.x, run.t, system.inclusion);
+
+    Simulation stepped(system, x0, options_of(system));
+    for (int k = 1; stepped.step(); ++k) {
+        if (k % 10 == 0) stepped.restore(stepped.save());
+    }
+    const auto again = stepped.finish();
+    EXPECT_EQ(again.t, run.t);
+    EXPECT_EQ(again.x, run.x);
+}
+
+class RandomPhases : public testing::TestWithParam<std::size_t> {};
+
+TEST_P(RandomPhases, EventsBesideAnInclusionComeWhenTheyHaveTo)
+{
+    const auto family = static_cast<InclusionFamily>(GetParam());
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+        SCOPED_TRACE(testing::Message() << "seed " << seed);
+        const auto full = random_inclusion<4>(family, seed);
+        switch (full.reactions) {
+            case 1: follow<1>(full, seed); break;
+            case 2: follow<2>(full, seed); break;
+            case 3: follow<3>(full, seed); break;
+            default: follow<4>(full, seed);
+        }
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Families, RandomPhases,
+                         testing::Range<std::size_t>(0, test::family_names.size() - 1));
+
+}  // namespace
+}  // namespace ricochet::random_phases_test
