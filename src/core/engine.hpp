@@ -218,8 +218,9 @@ protected:
 
     /// Applies a set without guards at the start of the step: a time event, or a change that the
     /// stepper has located. `settle` deals with its consequences.
-    void apply_without_guards(bool on_time);
-    void apply_time_event() { apply_without_guards(true); }
+    /// @param taken  as in `leave_from_start`
+    void apply_without_guards(bool on_time, double taken = 0);
+    void apply_time_event(double taken = 0) { apply_without_guards(true, taken); }
 
     /// After a time event the flow is that of the double after it, where it jumps there.
     void start_beyond_time_event()
@@ -822,15 +823,27 @@ protected:
 
     /// Whether guard i, on its surface at x⁻ and at x⁺ and about to enter `side`, has its event
     /// here: the set has changed the mode (or a sign in the state that the guard reads, if it
-    /// belongs to the set), and along the flow that was left it did not move that way. A crossing
-    /// that merely goes on in another mode is the same event.
+    /// belongs to the set; or its time event has changed the state or the flow), and along the flow
+    /// that was left it did not move that way. A crossing that merely goes on in another mode is
+    /// the same event.
     [[nodiscard]] bool leaves_at_once(std::size_t i, Side side);
-    /// Notes that the current set leaves the flow at the start of the step.
-    void leave_from_start()
+    /// Whether the time event of the set has changed the state or the flow.
+    [[nodiscard]] bool changes_on_time();
+    /// Notes that the current set leaves the flow at the start of the step, `taken` [s] after
+    /// that of `left_start_`, if it is known.
+    void leave_from_start(double taken)
     {
         assign(left_rate_, step_.rate0());
         left_known_ = true;
-        left_after_ = 0;
+        left_after_ = taken;
+    }
+    /// The same for a set with a time event, at the end of the step.
+    void leave_from_end()
+    {
+        assign(left_start_, step_.rate0());
+        assign(left_rate_, step_.rate1());
+        left_known_ = true;
+        left_after_ = step_.h();
     }
     /// Whether guard i is so near to its surface at x⁻ and x⁺ that only rounding tells its side.
     [[nodiscard]] bool stays_within_rounding(std::size_t i);

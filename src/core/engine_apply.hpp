@@ -188,12 +188,12 @@ inline bool EventEngine<X, single>::timer_is_endless()
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::apply_without_guards(bool on_time)
+inline void EventEngine<X, single>::apply_without_guards(bool on_time, double taken)
 {
     bank_.take_bands();
     search_.fired().clear();
     assign(search_.before(), step_.x0());
-    leave_from_start();
+    leave_from_start(taken);
     if (on_time) note_vetoes();
     if (phases_) place_set(step_.instant(0, 0));
     transform(on_time, false);

@@ -128,6 +128,8 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
             step_.flow(search_.at(), search_.before(), left_rate_);
             assign(left_start_, step_.rate0());
             left_after_ = search_.at();
+        } else if (on_time_) {
+            leave_from_end();
         }
         place_set(step_.instant(search_.at(), search_.at_remainder()));
         before_resets();

@@ -63,7 +63,7 @@ inline bool EventEngine<X, single>::apply_next_set(bool on_time)
     assign(search_.before(), step_.x0());
     search_.stay_at_start();
     place_set(step_.instant(0, 0));
-    leave_from_start();
+    leave_from_start(0);
     if (on_time) note_vetoes();
     transform(on_time, false);
     stuck_ = on_time ? no_guard : stuck_guard();
@@ -328,7 +328,8 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
         return false;
     }
     if (record.info.boolean || record.info.crossing == Crossing::either) return false;
-    if (!changed_mode_ && !(record.fired && resets_any_ && record.info.resets)) return false;
+    const bool is_member = record.fired && resets_any_ && record.info.resets;
+    if (!changed_mode_ && !is_member && !(on_time_ && changes_on_time())) return false;
     const X& left = search_.before();
     if (left.size() != step_.x0().size()) return false;
     const double t = step_.time(0);
@@ -345,20 +346,30 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
     if (sign_of(side) * moved > noise) return false;
     if (sign_of(side) * moved >= -noise) {  // a vanishing rate has the sign that it has later
         const double ahead = 1e-6 * h_next_;
+        const double then = step_.inside(step_.time(ahead));
         X rate = left_rate_;
-        if (changed_mode_) {
-            // The flow of a mode that has been left is not called any more.
+        X later = step_.x0();
+        if (changed_mode_ || !is_member) {
+            // The flow of a mode that has been left is not called any more; nor is one that a time
+            // event may have changed.
             const double part = left_after_ > 0 ? ahead / left_after_ : 0;
             for_each_component(rate,
                                [&](auto c) { rate[c] += part * (left_rate_[c] - left_start_[c]); });
         } else {
-            X later = step_.x0();
             move(later, left, ahead, left_rate_);
-            step_.flow_in(mode_before_, step_.inside(step_.time(ahead)), later, rate);
+            step_.flow_in(mode_before_, then, later, rate);
         }
-        if (sign_of(side) * guard.rate(t, step_.x0(), rate, h_next_) > noise) return false;
+        move(later, step_.x0(), ahead, left_rate_);
+        if (sign_of(side) * guard.rate(then, later, rate, h_next_) > noise) return false;
     }
     return record.fired || std::fabs(guard.value(t, left)) <= rounding_of(i, step_.mode(), t, left);
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::changes_on_time()
+{
+    return left_known_ &&
+           !(same_state(search_.before(), step_.x0()) && same_state(left_rate_, step_.rate0()));
 }
 
 template <class X, bool single>

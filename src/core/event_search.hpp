@@ -449,10 +449,10 @@ private:
         }
         add(end);
         // The bits of an event do not depend on where else the guard has been evaluated.
-        if (changes == 1 && resolution_.is_finest()) return Ends{}.examine(probe, watch);
+        if (changes == 1 && resolution_.is_finest()) return Ends::compare_signs(probe, watch);
         for (std::size_t k = 0;; ++k) {
             watch.end = samples[k];
-            const Finding finding = Ends{}.examine(probe, watch);
+            const Finding finding = Ends::compare_signs(probe, watch);
             if (finding.hit || k + 1 == count) return finding;
             watch.side = watch.side_after;
             watch.start = watch.end;

@@ -432,9 +432,11 @@ private:
     {
         if ((timed_ && time_event_due_) || change_due_) {
             mark_everything();
+            const double taken = step_.h();
+            assign(this->left_start_, step_.rate0());
             accept();
             on_change_ = std::exchange(change_due_, false);
-            this->apply_without_guards(timed_ && time_event_due_);
+            this->apply_without_guards(timed_ && time_event_due_, taken);
             return settle_and_record();
         }
         accept();

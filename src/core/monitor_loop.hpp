@@ -381,13 +381,14 @@ private:
             step_.restart(step_.start(), step_.x0(), step_.mode());
             return Verdict::ended;
         }
+        if (time_event_due_) assign(this->left_start_, step_.rate0());
         step_.accept_shown();
         ++run_.statistics.steps;
         this->last_h_ = step.h;
         if (!time_event_due_) return Verdict::stands;
         cut_.s = step.h;
         step_.hold(time_event_);
-        this->apply_time_event();
+        this->apply_time_event(step.h);
         return show_set();
     }
 

@@ -207,6 +207,20 @@ TEST(Instants, ATouchAtATickStaysATouch)
     }
 }
 
+TEST(Instants, ATouchAtATickIsNoCrossingForTheSignsAtTheEndsOfSteps)
+{
+    for (const double end : {1.0, 3.0}) {
+        for (const double step : {0.25, 0.09}) {
+            const auto run = integrate(TouchAtTick{}, One{0}, {.t_end = end, .step = step},
+                                       FixedStep<Rk4>{}, Ends{});
+            SCOPED_TRACE("steps of " + std::to_string(step) + " to " + std::to_string(end));
+            ASSERT_EQ(run.events.size(), 1U);
+            EXPECT_EQ(run.events[0].kind, EventKind::time);
+            EXPECT_EQ(run.mode, 0U);
+        }
+    }
+}
+
 /// x' = 1 with a guard that sets the clock back, and no ticks.
 struct Clock {
     using State = One;
