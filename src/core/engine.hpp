@@ -315,6 +315,10 @@ protected:
         return find(cleared, [] {});
     }
 
+    /// Whether the window of the set that was found reaches beyond the step, and a step that begins
+    /// shortly before the set would hold all of it: `before_window_` is the offset of that place.
+    [[nodiscard, gnu::noinline]] bool ends_inside_window();
+
     void count_refined() noexcept
     {
         run_.statistics.refined_steps += search_.refined();
@@ -656,6 +660,11 @@ protected:
     /// Holds what the rests of this instant have to hold. The run ends where that is not possible.
     void hold_rested();
 
+    /// Holds again what rests of the run before this one have held: of guards on their surfaces
+    /// whose `rest` leaves the state and the mode as they are.
+    void hold_again();
+    [[nodiscard]] bool is_at_rest(std::size_t i);
+
     /// Lets the components that are not held catch up with the limit of the events.
     void carry_on(double ahead);
 
@@ -972,11 +981,13 @@ protected:
     bool change_due_ = false;  ///< the step ends at a change that its stepper has located
     bool on_change_ = false;   ///< the current set lies there
     double passed_ = std::numeric_limits<double>::quiet_NaN();  ///< the last time event
-    bool due_here_ = false;            ///< a time event is due at the start of the step
-    bool timer_idles_ = false;         ///< the last time event of this instant changed nothing
-    double listed_at_ = stale;         ///< [s] where time events that are listed were counted,
-    std::size_t listed_left_ = 0;      ///< and how many of them are still to come
-    std::uint64_t timer_instant_ = 0;  ///< the last at which a timer was due, and how often then
+    bool cuts_before_windows_ = false;  ///< steps may end before a window, to hold all of it
+    double before_window_ = 0;          ///< [s] where the current step should; 0: it stands
+    bool due_here_ = false;             ///< a time event is due at the start of the step
+    bool timer_idles_ = false;          ///< the last time event of this instant changed nothing
+    double listed_at_ = stale;          ///< [s] where time events that are listed were counted,
+    std::size_t listed_left_ = 0;       ///< and how many of them are still to come
+    std::uint64_t timer_instant_ = 0;   ///< the last at which a timer was due, and how often then
     std::uint32_t timer_at_once_ = 0;
     bool ended_ = false;
     bool endless_ = false;  ///< the end of the options is infinite

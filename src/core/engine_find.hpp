@@ -109,6 +109,7 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
     bank_.begin_search(step_.h());
     for (bool may_tie = true;;) {
         const bool found = search_.find_set(step_, bank_, time_event_due_, calls());
+        if (cuts_before_windows_ && found && may_tie && ends_inside_window()) return false;
         const bool tied = may_tie && add_ties(found);
         if (!found && !tied) break;
         may_tie = may_tie && !tied;
@@ -154,6 +155,19 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
     count_refined();
     bank_.pass_on_after_events();
     return false;
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::ends_inside_window()
+{
+    if (ends_on_time() || change_due_) return false;
+    const double first = search_.first_root();
+    const double t = step_.time(first);
+    const double window = resolution_.window(t), before = window / 16;
+    if (window == resolution_.blur(t) || first + window <= step_.h()) return false;
+    if (first <= 2 * before || before + window > h_next_) return false;
+    before_window_ = first - before;
+    return true;
 }
 
 template <class X, bool single>

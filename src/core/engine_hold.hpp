@@ -80,6 +80,36 @@ void EventEngine<X, single>::hold_rested()
 }
 
 template <class X, bool single>
+void EventEngine<X, single>::hold_again()
+{
+    if (!system_->rest) return;
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        Hold hold;
+        if (!is_at_rest(i) || !presses({i, 0, 0}, hold) || !finds_components(hold)) continue;
+        holds_.push_back(hold);
+        renew_holds();
+        if (stays_held(hold)) continue;
+        holds_.pop_back();
+        renew_holds();
+        if (!step_.is_of_host()) step_.refresh();
+    }
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::is_at_rest(std::size_t i)
+{
+    const Mode mode = step_.mode();
+    const GuardInfo& info = std::as_const(bank_)[i].info;
+    if (is_of_phases(i) || info.boolean || !(resets_any_ && info.resets)) return false;
+    if (!system_.enabled_in(i, mode)) return false;
+    const double t = step_.time(0);
+    const double g = bank_.view(i, mode, calls()).value(t, step_.x0());
+    if (!(std::fabs(g) <= rounding_of(i))) return false;
+    X x = step_.x0();
+    return system_->rest(system_.door(), i, mode, t, x) == mode && same_state(x, step_.x0());
+}
+
+template <class X, bool single>
 void EventEngine<X, single>::carry_on(double ahead)
 {
     if (ahead == 0 || step_.is_of_host()) return;

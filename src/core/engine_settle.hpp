@@ -125,6 +125,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::arm_at_start(bool begins)
 {
     enters_mode_ = false;
+    if (!begins) hold_again();
     enable_guards();
     newly_armed_ = true;
     watching_ = false;
@@ -158,7 +159,9 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
     if (side == Side::plateau)
         bank_.await(i, awaited_side(Cause::start, info, record.acting, side));
     if (arming == Arming::waits) {
-        if (begins && record.acting && is_beyond(side, info.crossing)) count_armed_beyond(i);
+        // One that fires at the start has done so in the run before.
+        const bool is_known = !begins && info.at_start && options_.continues;
+        if (record.acting && is_beyond(side, info.crossing) && !is_known) count_armed_beyond(i);
     } else if (arming != Arming::outside && counts_here(i)) {
         have_event(i, arming, side);
     }

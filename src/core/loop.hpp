@@ -60,6 +60,8 @@ public:
             h_next_ = std::min(h_next_, options_.h_max);
         }
         first_step_ = h_next_;
+        this->cuts_before_windows_ =
+            options_.event_window > 0 && !defers_ && (bank_.size() > 1 || timed_);
         flight_start_ = options_.t_start;
         this->refuse_bad_modes();
         if (!step_.flow_fits()) throw_flow_does_not_fit("integrate", components_);
@@ -580,6 +582,9 @@ private:
         this->settle_all();
         record_restart();
     }
+
+    /// Ends the step before the window of a set, which the next step is to hold as a whole.
+    [[gnu::noinline]] void stop_before_window();
 
     /// Completes what the step has to show before the resets of a set, which may change the flow.
     void show_before_resets();
