@@ -760,6 +760,8 @@ protected:
     void arm_after_rest();
 
     void enable_guards();
+    /// Guards that are armed again are not newly enabled.
+    void forget_enabling();
 
     /// Whether the event of a guard armed on `side` cannot come before it has returned: it is
     /// beyond its surface.

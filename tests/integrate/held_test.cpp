@@ -213,6 +213,38 @@ TEST(Held, ARestartBeyondASurfaceIsCounted)
     EXPECT_EQ(run.armed_beyond, std::vector<std::size_t>{0});
 }
 
+TEST(Held, ARunThatIsSavedAfterAReleaseIsTheSameRun)
+{
+    // The first ball is lifted off its floor while the second still bounces.
+    struct Balls {
+        using State = std::array<double, 4>;
+        std::size_t guard_count = 2;
+        void flow(double t, const State& x, State& dxdt) const
+        {
+            dxdt = {x[2], x[3], 10 * std::min(t - 1, 0.1), -1};
+        }
+        [[nodiscard]] double guard(std::size_t which, double, const State& x) const
+        {
+            return x[which];
+        }
+        void reset(std::size_t which, double, State& x) const
+        {
+            x[which] = 0;
+            x[which + 2] *= -0.5 - 0.4 * static_cast<double>(which);
+        }
+        void rest(std::size_t which, double, State& x) const { x[which] = x[which + 2] = 0; }
+    };
+    Simulation simulation(Balls{}, {0.01, 0.1, 0, 0}, {.t_end = 3});
+    while (times_of(simulation.run(), EventKind::mode).empty()) ASSERT_TRUE(simulation.step());
+    Simulation other(Balls{}, {0.01, 0.1, 0, 0}, {.t_end = 3});
+    other.restore(simulation.save());
+    while (simulation.step()) {
+        ASSERT_TRUE(other.step());
+        ASSERT_EQ(to_text(other.save()), to_text(simulation.save())) << simulation.t();
+    }
+    EXPECT_EQ(other.x(), simulation.x());
+}
+
 // --- what goes free ---
 
 /// A ball that is pulled by `pull(t)`; the floor has e = 0.5, and throws it up by `launch` where
