@@ -640,9 +640,22 @@ private:
     /// it is taken after it.
     [[nodiscard]] double before_rounding(double t) const noexcept
     {
-        const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
-        return backward_ ? t + ulps : t - ulps;
+        return backward_ ? t + rounding(t) : t - rounding(t);
     }
+    /// Whether only rounding parts two times.
+    [[nodiscard]] static bool is_rounding(double sample, double t) noexcept
+    {
+        return std::fabs(sample - t) <= rounding(t);
+    }
+    [[nodiscard]] static double rounding(double t) noexcept
+    {
+        return 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+    }
+    /// Whether the step starts where a set has happened: the samples there are the state after it.
+    [[nodiscard]] bool starts_at_set() const noexcept;
+    /// Adds the next sample if only rounding parts it from the events at time t, where the step
+    /// starts.
+    void emit_sample_with(double t);
 
     [[nodiscard]] bool lies_before(double t, double end) const noexcept
     {

@@ -261,6 +261,42 @@ TEST(Instants, ASampleAtAnEventIsTakenAfterItWhateverTheRounding)
     }
 }
 
+TEST(Instants, ASampleAtAnEventIsItsStateAfterAndOneStop)
+{
+    for (const double period : {1.0, 0.3, 0.1, 1.0 / 3, 0.001}) {
+        Options options{.t_end = 100.5 * period};
+        for (int n = 1; n <= 100; ++n) options.sample_times.push_back(n * period);
+        const auto check = [&](auto&& simulation, const std::string& label) {
+            SCOPED_TRACE(label + ", period " + std::to_string(period));
+            std::size_t stops = 0;
+            while (simulation.advance()) {
+                ASSERT_LT(stops, 100U);
+                EXPECT_EQ(simulation.t(), options.sample_times[stops++]);
+                EXPECT_EQ(simulation.x(), simulation.run().events.back().after);
+            }
+            EXPECT_EQ(stops, 100U);
+            EXPECT_EQ(simulation.run().events.size(), 100U);
+        };
+        check(Simulation(Clock{period}, One{0}, options), "dopri5");
+        options.step = period / 7;
+        check(Simulation(Clock{period}, One{0}, options, FixedStep<Rk4>{}), "rk4");
+        // The same samples without stops.
+        const auto run = integrate(Clock{period}, One{0}, options, FixedStep<Rk4>{});
+        for (const auto& x : run.trajectory.x) EXPECT_EQ(x, One{0});
+    }
+}
+
+TEST(Instants, ASampleAtTheEventThatEndsTheRunIsOneStop)
+{
+    struct Ending : Clock {
+        [[nodiscard]] GuardInfo guard_info() const { return {.stop_after = 2}; }
+    };
+    Simulation simulation(Ending{}, One{0}, {.t_end = 5, .sample_times = {0.5, 1, 2, 3}});
+    std::vector<double> stops;
+    while (simulation.advance()) stops.push_back(simulation.t());
+    EXPECT_EQ(stops, (std::vector<double>{0.5, 1, 2}));
+}
+
 // --- flows that jump at time events ---
 
 /// x' = 1 from time 1 on, which is a time event.
