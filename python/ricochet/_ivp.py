@@ -338,7 +338,7 @@ def _result(run, count, dense_output, events_given):
     result = OdeResult(t=run.times, y=run.states.T, sol=run.solution if dense_output else None,
                        t_events=None, y_events=None)
     statistics = run.statistics
-    message = _MESSAGES.get(run.outcome, run.message)
+    message = run.message if run.reason else _MESSAGES.get(run.outcome, run.message)
     if events_given:
         message = _OWN_MESSAGES.get(run.outcome, message)
         if run.other_guard is not None:  # of a cycle that accumulates, or of two resets

@@ -229,7 +229,12 @@ bool EventEngine<X, single>::acts_beyond()
 {
     std::uint64_t& count = run_.statistics.ineffective_resets;
     const auto fired = search_.fired().span();
-    for (const std::size_t i : fired) count += bank_[i].info.resets;
+    // A reset that is told the direction of its crossing may be meant for one of them.
+    const auto is_meant = [this](std::size_t i) {
+        const GuardInfo& info = bank_[i].info;
+        return info.resets && !(system_->tell_direction && info.crossing == Crossing::either);
+    };
+    for (const std::size_t i : fired) count += is_meant(i);
     const std::size_t i = fired[0];
     if (!system_->moded || !system_->reset || fired.size() > 1 || !bank_[i].info.resets) {
         return false;
@@ -238,10 +243,10 @@ bool EventEngine<X, single>::acts_beyond()
     if (kept_.uses_space) search_.put_space_back();
     const double t = search_.go_beyond(step_, bank_, i, x, calls());
     if (t == t && resets_.ask_again(system_, i, step_.mode(), t, x, search_.before())) {
-        --count;
+        count -= is_meant(i);
         return true;
     }
-    run_.statistics.declined_guard = i;
+    if (is_meant(i)) run_.statistics.declined_guard = i;
     return false;
 }
 

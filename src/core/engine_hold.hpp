@@ -210,6 +210,7 @@ void EventEngine<X, single>::release_changed(const X& before, const X& after, bo
 template <class X, bool single>
 double EventEngine<X, single>::lift(const Hold& hold, double t, const X& x)
 {
+    if (!system_.enabled_at(hold.guard, step_.mode(), t, x)) return 1;
     if (!system_->flow || hold.ahead == 0) return -1;
     return hold.inward * free_drift({hold.guard, t, &x, hold.ahead, true}) - hold.rounding;
 }
@@ -343,6 +344,7 @@ bool EventEngine<X, single>::guards_stand_still(double t)
 {
     for (std::size_t i = 0; i < bank_.size(); ++i) {
         if (!system_.enabled_in(i, step_.mode())) continue;
+        if (is_held(i) && !system_.enabled_at(i, step_.mode(), t, step_.x0())) return false;
         const auto guard = bank_.view(i, step_.mode(), calls());
         const double g = guard.value(step_.time(0), step_.x0());
         const double moved = std::fabs(guard.value(t, step_.x0()) - g);

@@ -23,6 +23,7 @@ namespace ricochet::detail {
 [[noreturn]] void throw_held_moved(std::size_t component, double expected, double found);
 /// @throws std::logic_error because the step goes beyond a time event.
 [[noreturn]] void throw_beyond_time_event(double event, double end);
+[[noreturn]] void throw_hold_not_ahead(double now, double found);
 /// @throws std::logic_error because guards have to be examined before that time.
 [[noreturn]] void throw_not_quiet(double until, double found);
 /// @throws std::invalid_argument for a length, time or scale that is not a positive or finite
@@ -129,7 +130,7 @@ public:
     {
         if (!resting_ || ended_) throw_out_of_turn("hold", "it after a verdict `rests` alone");
         if (!lies_before(step_.start().value, t) || !std::isfinite(t)) {
-            throw_no_length("the time of `hold`", t);
+            throw_hold_not_ahead(step_.start().value, t);
         }
         const bool due = timed_ && !lies_before(t, time_event_);
         if (due && t != time_event_) throw_beyond_time_event(time_event_, t);

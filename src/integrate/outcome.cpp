@@ -51,7 +51,9 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::stopped_by_event: return "an event ended the run, as asked";
         case Outcome::zeno:
             return "the motion presses on its guard, or its events accumulate there, and nothing "
-                   "stops it; let it come to rest there (a system by its rest, a scene by its "
+                   "stops it; let it come to rest there (a system by its rest, or, where its "
+                   "surface "
+                   "moves or `rest` mixes components, by a mode of its own; a scene by its "
                    "contacts), or end the run earlier";
         case Outcome::outside_mode:
             return "a reset left the state behind a guard that bounds the motion; "

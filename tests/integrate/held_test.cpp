@@ -345,6 +345,35 @@ struct Ledge : Thrown {
     }
 };
 
+TEST(Held, AVetoSetsTheBallFree)
+{
+    // The platform is there until 2 s, or as far as x = 2.
+    struct Platform : Thrown {
+        bool by_place = false;
+        [[nodiscard]] bool enabled(double t, const State& x) const
+        {
+            return (by_place ? x[0] : t) < 2;
+        }
+    };
+    for (const bool by_place : {false, true}) {
+        for (const double speed : {1.0, 0.0}) {
+            if (by_place && speed == 0) continue;
+            Platform platform;
+            platform.by_place = by_place;
+            for (const bool fixed : {false, true}) {
+                const Options options{.t_end = 3, .step = fixed ? 0.013 : 0, .rtol = 1e-10};
+                const auto run =
+                    fixed ? integrate(platform, {0, 0.1, speed, 0}, options, FixedStep<Rk4>{})
+                          : integrate(platform, {0, 0.1, speed, 0}, options);
+                SCOPED_TRACE(speed);
+                expect_near(times_of(run, EventKind::mode), {2}, 1e-9);
+                EXPECT_NEAR(run.x[1], -5, 1e-7);
+                EXPECT_NEAR(run.x[0], 3 * speed, 1e-12);
+            }
+        }
+    }
+}
+
 TEST(Held, AChangeOfModeSetsTheBallFree)
 {
     const auto run = integrate(Ledge{}, {0, 0.1, 1, 0}, {.t_end = 3, .rtol = 1e-10});

@@ -533,6 +533,25 @@ struct OldMode {
 
 // --- the direction of a crossing ---
 
+TEST(Instants, AResetThatActsInOneDirectionOnlyIsNotIneffective)
+{
+    struct UpOnly {
+        using State = One;
+        Crossing crossing = Crossing::either;
+        void flow(double, const State&, State& dxdt) const { dxdt = {0}; }
+        [[nodiscard]] double guard(double t, const State&) const { return std::sin(t); }
+        void reset(Crossing direction, double, State& x) const
+        {
+            if (direction == Crossing::rising) x[0] += 1;
+        }
+    };
+    const auto run = integrate(UpOnly{}, One{0}, {.t_start = 0.1, .t_end = 20, .h_max = 0.5});
+    EXPECT_EQ(run.x[0], 3);
+    EXPECT_EQ(run.statistics.events, 6U);
+    EXPECT_EQ(run.statistics.ineffective_resets, 0U);
+    EXPECT_EQ(run.statistics.declined_guard, no_guard);
+}
+
 /// Counts the turns of sin t: up and down, in a mode each or without.
 struct Turns {
     using State = std::array<double, 2>;

@@ -907,6 +907,13 @@ TEST(MonitorRefusals, HoldsWithoutEnd)
     for (const double t : {inf, -inf, nan, 1.0, 0.0}) {
         EXPECT_THROW((void)monitor.hold(t), std::invalid_argument) << t;
     }
+    try {
+        (void)monitor.hold(0.5);
+        FAIL();
+    } catch (const std::invalid_argument& refused) {
+        EXPECT_STREQ(refused.what(),
+                     "EventMonitor: found `hold` to 0.5 s; expected a finite time after 1 s");
+    }
     EXPECT_EQ(monitor.hold(2), Verdict::rests);
     EXPECT_EQ(monitor.t().value, 2);
 }
