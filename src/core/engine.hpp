@@ -172,6 +172,16 @@ protected:
         ended_ = true;
     }
 
+    /// Ends the run since a function, "flow" or of guard i, was not finite.
+    [[gnu::cold, gnu::noinline]] void end_not_finite(std::string_view function,
+                                                     std::size_t i) noexcept
+    {
+        end(Outcome::non_finite, i);
+        const bool has_guard = i < bank_.size();
+        run_.reason = reason_not_finite(
+            function, i, has_guard ? std::string_view(bank_[i].info.name) : std::string_view());
+    }
+
     /// Forgets what ended a run before.
     void forget_cause() noexcept
     {

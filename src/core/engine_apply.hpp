@@ -106,7 +106,7 @@ inline bool EventEngine<X, single>::goes_on()
     } else if (!fits_dimension(search_.before(), resets_.after(), resets_.mode() == step_.mode())) {
         end(Outcome::wrong_dimension, first_fired());
     } else if (!all_finite(resets_.after())) {
-        end(Outcome::non_finite, first_fired());
+        end_not_finite("reset", first_fired());
     }
     return !ended_;
 }

@@ -260,7 +260,7 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
     GuardRecord& record = bank_[i];
     const double g = bank_.g0(i);
     if (!std::isfinite(g)) {
-        end(Outcome::non_finite, i);
+        end_not_finite("", i);
         return false;
     }
     const Crossing crossing = record.info.crossing;
@@ -438,7 +438,7 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
     }
     if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
     if (!std::isfinite(rate)) {
-        end(Outcome::non_finite, i);
+        all_finite(step_.rate0()) ? end_not_finite("rate", i) : end_not_finite("flow", no_guard);
         return Side::plateau;
     }
     if (rate != 0 && bank_[i].fired) return side_of(rate);

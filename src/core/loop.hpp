@@ -424,7 +424,9 @@ private:
     /// Ends the run after a failed step.
     void end_step(Outcome outcome) noexcept
     {
-        end(step_.flow_fits() ? outcome : Outcome::wrong_dimension);
+        if (!step_.flow_fits()) return end(Outcome::wrong_dimension);
+        if (outcome == Outcome::non_finite) return this->end_not_finite("flow", no_guard);
+        end(outcome);
     }
 
     void reach_end();

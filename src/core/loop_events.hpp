@@ -75,7 +75,7 @@ inline bool Loop<X, single>::return_to_domain()
         const double h = shorten_into_domain(std::exchange(beyond, false));
         if (is_tentative() || h < smallest_step()) {
             if (!is_tentative() && happen_where_flow_ends(h)) return false;
-            end(Outcome::non_finite, broken);
+            this->end_not_finite("", broken);
             return false;
         }
         ++run_.statistics.rejected;

@@ -137,7 +137,8 @@ inline void Loop<X, single>::reach_end()
         planner_->check_last(step_, bank_, run_.statistics);
         if (planner_->wrong()) return this->name_wrong_bound();
     }
-    end(Outcome::reached_end);
+    // The largest double is no end that a run without an end was meant to reach.
+    end(endless_ ? Outcome::stalled : Outcome::reached_end);
 }
 
 template <class X, bool single>

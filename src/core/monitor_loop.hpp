@@ -409,7 +409,7 @@ private:
         std::size_t broken = bank_.first_not_finite();
         if (broken == no_guard) broken = bank_.first_without_rate();  // the host no longer has it
         if (broken == no_guard) return this->find(cleared);
-        this->end(Outcome::non_finite, broken);
+        this->end_not_finite("", broken);
         return false;
     }
 

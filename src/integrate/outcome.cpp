@@ -92,9 +92,9 @@ std::string_view describe(Outcome outcome) noexcept
                    "left the mode as it was; write into the components that are there, or declare "
                    "`static constexpr bool changes_dimension = true`";
         case Outcome::stalled:
-            return "stall_steps steps hardly advanced the time; end the run earlier, let events "
-                   "that "
-                   "accumulate come to rest, or raise max_steps or stall_steps";
+            return "stall_steps steps hardly advanced the time, or nothing ended a run without an "
+                   "end; end the run earlier, let events that accumulate come to rest, or raise "
+                   "max_steps or stall_steps";
         case Outcome::stopped_by_callback:
             return "a function of the system reported an error; all that was computed before is "
                    "kept, and the next call continues from the last completed step";
@@ -133,11 +133,19 @@ std::string describe(const Statistics& statistics, std::span<const std::string> 
     return out;
 }
 
+std::string detail::describe_reason(Outcome outcome, const std::string& reason)
+{
+    if (outcome != Outcome::non_finite) return "a reset ended the run: " + reason;
+    return reason +
+           " returned NaN or infinity, or led to a state that is not finite; the last finite state "
+           "is kept";
+}
+
 std::string detail::describe_run(Outcome outcome, const std::string& reason,
                                  const std::vector<std::size_t>& armed_beyond)
 {
     std::string out(describe(outcome));
-    if (!reason.empty()) out = "a reset ended the run: " + reason;
+    if (!reason.empty()) out = describe_reason(outcome, reason);
     if (armed_beyond.empty()) return out;
     out += armed_beyond.size() == 1 ? "; guard " : "; guards ";
     for (std::size_t i = 0; i < armed_beyond.size(); ++i) {
