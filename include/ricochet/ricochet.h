@@ -383,8 +383,9 @@ RC_API rc_outcome_code rc_outcome(rc_simulation* simulation);
 RC_API const char* rc_outcome_name(rc_outcome_code outcome);
 /** One sentence about an outcome, with the remedy. */
 RC_API const char* rc_outcome_text(rc_outcome_code outcome);
-/** The text of rc_stop() that ended the run; empty if none did, and for a handle that cannot be
- *  used. Valid until the next call that advances, restores or frees the simulation. */
+/** The text of rc_stop() that ended the run, or, of RC_NON_FINITE, which function was not finite;
+ *  else empty, and for a handle that cannot be used. Valid until the next call that advances,
+ * restores or frees the simulation. */
 RC_API const char* rc_reason(rc_simulation* simulation);
 /** A sentence about the run so far: that about its outcome with the text of rc_stop(), and the
  *  guards that were armed beyond their surface. Valid until the next call with this simulation;

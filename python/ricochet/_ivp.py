@@ -41,8 +41,8 @@ _OWN_MESSAGES = {
     "step_limit": "as many steps were taken as max_steps allows; allow more or end t_span earlier",
     "non_finite": "fun, an event or a reset returned NaN or infinity; the last finite state is "
                   "kept",
-    "stalled": "stall_steps steps hardly advanced the time; end t_span earlier, let events that "
-               "accumulate come to rest, or raise max_step or stall_steps"}
+    "stalled": "stall_steps steps hardly advanced the time, or nothing ended a run without an "
+               "end; end t_span earlier, let events that accumulate come to rest, or raise max_step or stall_steps"}
 _WORDS = (("t_end - t_start", "t_span[1] - t_span[0]"), ("t_end", "t_span[1]"),
           ("t_start", "t_span[0]"), ("h_max", "max_step"), ("the start must", "y0 must"),
           ("the start lies", "y0 lies"), ("expected guard >= 0", "expected a value >= 0"),
@@ -338,7 +338,7 @@ def _result(run, count, dense_output, events_given):
     result = OdeResult(t=run.times, y=run.states.T, sol=run.solution if dense_output else None,
                        t_events=None, y_events=None)
     statistics = run.statistics
-    message = _MESSAGES.get(run.outcome, run.message)
+    message = run.message if run.reason else _MESSAGES.get(run.outcome, run.message)
     if events_given:
         message = _OWN_MESSAGES.get(run.outcome, message)
         if run.other_guard is not None:  # of a cycle that accumulates, or of two resets

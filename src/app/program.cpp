@@ -201,7 +201,7 @@ void add_run_options(CLI::App& command, RunRequest& run)
                "width to which events are located [s], default: neighbouring doubles");
     add_whole_number(command, "--max-steps", run.max_steps, 1,
                      std::numeric_limits<std::uint64_t>::max(),
-                     "end the run after N steps, as step_limit; default 10 million");
+                     "end the run after N steps, as step_limit; default 2 million");
 }
 
 void add_simulate(CLI::App& app, int& status, SimulateHandler handler)

@@ -15,8 +15,8 @@ namespace ricochet::app {
 
 namespace {
 
-/// About a minute: a longer run must be requested.
-constexpr std::uint64_t default_max_steps = 10'000'000;
+/// A few seconds of cheap steps, whatever the parameters: a longer run must be requested.
+constexpr std::uint64_t default_max_steps = 2'000'000;
 
 template <class Kind, std::size_t n>
 using Names = std::array<std::pair<std::string_view, Kind>, n>;

@@ -172,6 +172,16 @@ protected:
         ended_ = true;
     }
 
+    /// Ends the run since a function, "flow" or of guard i, was not finite.
+    [[gnu::cold, gnu::noinline]] void end_not_finite(std::string_view function,
+                                                     std::size_t i) noexcept
+    {
+        end(Outcome::non_finite, i);
+        const bool has_guard = i < bank_.size();
+        run_.reason = reason_not_finite(
+            function, i, has_guard ? std::string_view(bank_[i].info.name) : std::string_view());
+    }
+
     /// Forgets what ended a run before.
     void forget_cause() noexcept
     {
@@ -218,8 +228,9 @@ protected:
 
     /// Applies a set without guards at the start of the step: a time event, or a change that the
     /// stepper has located. `settle` deals with its consequences.
-    void apply_without_guards(bool on_time);
-    void apply_time_event() { apply_without_guards(true); }
+    /// @param taken  as in `leave_from_start`
+    void apply_without_guards(bool on_time, double taken = 0);
+    void apply_time_event(double taken = 0) { apply_without_guards(true, taken); }
 
     /// After a time event the flow is that of the double after it, where it jumps there.
     void start_beyond_time_event()
@@ -313,6 +324,10 @@ protected:
     {
         return find(cleared, [] {});
     }
+
+    /// Whether the window of the set that was found reaches beyond the step, and a step that begins
+    /// shortly before the set would hold all of it: `before_window_` is the offset of that place.
+    [[nodiscard, gnu::noinline]] bool ends_inside_window();
 
     void count_refined() noexcept
     {
@@ -655,6 +670,11 @@ protected:
     /// Holds what the rests of this instant have to hold. The run ends where that is not possible.
     void hold_rested();
 
+    /// Holds again what rests of the run before this one have held: of guards on their surfaces
+    /// whose `rest` leaves the state and the mode as they are.
+    void hold_again();
+    [[nodiscard]] bool is_at_rest(std::size_t i);
+
     /// Lets the components that are not held catch up with the limit of the events.
     void carry_on(double ahead);
 
@@ -750,6 +770,8 @@ protected:
     void arm_after_rest();
 
     void enable_guards();
+    /// Guards that are armed again are not newly enabled.
+    void forget_enabling();
 
     /// Whether the event of a guard armed on `side` cannot come before it has returned: it is
     /// beyond its surface.
@@ -822,15 +844,27 @@ protected:
 
     /// Whether guard i, on its surface at x⁻ and at x⁺ and about to enter `side`, has its event
     /// here: the set has changed the mode (or a sign in the state that the guard reads, if it
-    /// belongs to the set), and along the flow that was left it did not move that way. A crossing
-    /// that merely goes on in another mode is the same event.
+    /// belongs to the set; or its time event has changed the state or the flow), and along the flow
+    /// that was left it did not move that way. A crossing that merely goes on in another mode is
+    /// the same event.
     [[nodiscard]] bool leaves_at_once(std::size_t i, Side side);
-    /// Notes that the current set leaves the flow at the start of the step.
-    void leave_from_start()
+    /// Whether the time event of the set has changed the state or the flow.
+    [[nodiscard]] bool changes_on_time();
+    /// Notes that the current set leaves the flow at the start of the step, `taken` [s] after
+    /// that of `left_start_`, if it is known.
+    void leave_from_start(double taken)
     {
         assign(left_rate_, step_.rate0());
         left_known_ = true;
-        left_after_ = 0;
+        left_after_ = taken;
+    }
+    /// The same for a set with a time event, at the end of the step.
+    void leave_from_end()
+    {
+        assign(left_start_, step_.rate0());
+        assign(left_rate_, step_.rate1());
+        left_known_ = true;
+        left_after_ = step_.h();
     }
     /// Whether guard i is so near to its surface at x⁻ and x⁺ that only rounding tells its side.
     [[nodiscard]] bool stays_within_rounding(std::size_t i);
@@ -959,11 +993,13 @@ protected:
     bool change_due_ = false;  ///< the step ends at a change that its stepper has located
     bool on_change_ = false;   ///< the current set lies there
     double passed_ = std::numeric_limits<double>::quiet_NaN();  ///< the last time event
-    bool due_here_ = false;            ///< a time event is due at the start of the step
-    bool timer_idles_ = false;         ///< the last time event of this instant changed nothing
-    double listed_at_ = stale;         ///< [s] where time events that are listed were counted,
-    std::size_t listed_left_ = 0;      ///< and how many of them are still to come
-    std::uint64_t timer_instant_ = 0;  ///< the last at which a timer was due, and how often then
+    bool cuts_before_windows_ = false;  ///< steps may end before a window, to hold all of it
+    double before_window_ = 0;          ///< [s] where the current step should; 0: it stands
+    bool due_here_ = false;             ///< a time event is due at the start of the step
+    bool timer_idles_ = false;          ///< the last time event of this instant changed nothing
+    double listed_at_ = stale;          ///< [s] where time events that are listed were counted,
+    std::size_t listed_left_ = 0;       ///< and how many of them are still to come
+    std::uint64_t timer_instant_ = 0;   ///< the last at which a timer was due, and how often then
     std::uint32_t timer_at_once_ = 0;
     bool ended_ = false;
     bool endless_ = false;  ///< the end of the options is infinite

@@ -106,7 +106,7 @@ inline bool EventEngine<X, single>::goes_on()
     } else if (!fits_dimension(search_.before(), resets_.after(), resets_.mode() == step_.mode())) {
         end(Outcome::wrong_dimension, first_fired());
     } else if (!all_finite(resets_.after())) {
-        end(Outcome::non_finite, first_fired());
+        end_not_finite("reset", first_fired());
     }
     return !ended_;
 }
@@ -188,12 +188,12 @@ inline bool EventEngine<X, single>::timer_is_endless()
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::apply_without_guards(bool on_time)
+inline void EventEngine<X, single>::apply_without_guards(bool on_time, double taken)
 {
     bank_.take_bands();
     search_.fired().clear();
     assign(search_.before(), step_.x0());
-    leave_from_start();
+    leave_from_start(taken);
     if (on_time) note_vetoes();
     if (phases_) place_set(step_.instant(0, 0));
     transform(on_time, false);

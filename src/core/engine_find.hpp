@@ -109,6 +109,7 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
     bank_.begin_search(step_.h());
     for (bool may_tie = true;;) {
         const bool found = search_.find_set(step_, bank_, time_event_due_, calls());
+        if (cuts_before_windows_ && found && may_tie && ends_inside_window()) return false;
         const bool tied = may_tie && add_ties(found);
         if (!found && !tied) break;
         may_tie = may_tie && !tied;
@@ -128,6 +129,8 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
             step_.flow(search_.at(), search_.before(), left_rate_);
             assign(left_start_, step_.rate0());
             left_after_ = search_.at();
+        } else if (on_time_) {
+            leave_from_end();
         }
         place_set(step_.instant(search_.at(), search_.at_remainder()));
         before_resets();
@@ -152,6 +155,19 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
     count_refined();
     bank_.pass_on_after_events();
     return false;
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::ends_inside_window()
+{
+    if (ends_on_time() || change_due_) return false;
+    const double first = search_.first_root();
+    const double t = step_.time(first);
+    const double window = resolution_.window(t), before = window / 16;
+    if (window == resolution_.blur(t) || first + window <= step_.h()) return false;
+    if (first <= 2 * before || before + window > h_next_) return false;
+    before_window_ = first - before;
+    return true;
 }
 
 template <class X, bool single>
@@ -213,7 +229,12 @@ bool EventEngine<X, single>::acts_beyond()
 {
     std::uint64_t& count = run_.statistics.ineffective_resets;
     const auto fired = search_.fired().span();
-    for (const std::size_t i : fired) count += bank_[i].info.resets;
+    // A reset that is told the direction of its crossing may be meant for one of them.
+    const auto is_meant = [this](std::size_t i) {
+        const GuardInfo& info = bank_[i].info;
+        return info.resets && !(system_->tell_direction && info.crossing == Crossing::either);
+    };
+    for (const std::size_t i : fired) count += is_meant(i);
     const std::size_t i = fired[0];
     if (!system_->moded || !system_->reset || fired.size() > 1 || !bank_[i].info.resets) {
         return false;
@@ -222,10 +243,10 @@ bool EventEngine<X, single>::acts_beyond()
     if (kept_.uses_space) search_.put_space_back();
     const double t = search_.go_beyond(step_, bank_, i, x, calls());
     if (t == t && resets_.ask_again(system_, i, step_.mode(), t, x, search_.before())) {
-        --count;
+        count -= is_meant(i);
         return true;
     }
-    run_.statistics.declined_guard = i;
+    if (is_meant(i)) run_.statistics.declined_guard = i;
     return false;
 }
 

@@ -80,6 +80,36 @@ void EventEngine<X, single>::hold_rested()
 }
 
 template <class X, bool single>
+void EventEngine<X, single>::hold_again()
+{
+    if (!system_->rest) return;
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        Hold hold;
+        if (!is_at_rest(i) || !presses({i, 0, 0}, hold) || !finds_components(hold)) continue;
+        holds_.push_back(hold);
+        renew_holds();
+        if (stays_held(hold)) continue;
+        holds_.pop_back();
+        renew_holds();
+        if (!step_.is_of_host()) step_.refresh();
+    }
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::is_at_rest(std::size_t i)
+{
+    const Mode mode = step_.mode();
+    const GuardInfo& info = std::as_const(bank_)[i].info;
+    if (is_of_phases(i) || info.boolean || !(resets_any_ && info.resets)) return false;
+    if (!system_.enabled_in(i, mode)) return false;
+    const double t = step_.time(0);
+    const double g = bank_.view(i, mode, calls()).value(t, step_.x0());
+    if (!(std::fabs(g) <= rounding_of(i))) return false;
+    X x = step_.x0();
+    return system_->rest(system_.door(), i, mode, t, x) == mode && same_state(x, step_.x0());
+}
+
+template <class X, bool single>
 void EventEngine<X, single>::carry_on(double ahead)
 {
     if (ahead == 0 || step_.is_of_host()) return;
@@ -180,6 +210,7 @@ void EventEngine<X, single>::release_changed(const X& before, const X& after, bo
 template <class X, bool single>
 double EventEngine<X, single>::lift(const Hold& hold, double t, const X& x)
 {
+    if (!system_.enabled_at(hold.guard, step_.mode(), t, x)) return 1;
     if (!system_->flow || hold.ahead == 0) return -1;
     return hold.inward * free_drift({hold.guard, t, &x, hold.ahead, true}) - hold.rounding;
 }
@@ -313,6 +344,7 @@ bool EventEngine<X, single>::guards_stand_still(double t)
 {
     for (std::size_t i = 0; i < bank_.size(); ++i) {
         if (!system_.enabled_in(i, step_.mode())) continue;
+        if (is_held(i) && !system_.enabled_at(i, step_.mode(), t, step_.x0())) return false;
         const auto guard = bank_.view(i, step_.mode(), calls());
         const double g = guard.value(step_.time(0), step_.x0());
         const double moved = std::fabs(guard.value(t, step_.x0()) - g);

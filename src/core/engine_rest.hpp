@@ -253,7 +253,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
         return end(Outcome::wrong_dimension, i);
     }
     if (!all_finite(after)) {
-        return end(Outcome::non_finite, i);
+        return end_not_finite("rest", i);
     }
     leaves_phase_ = false;
     enters_mode_ = shown(mode_after) != shown(mode);

@@ -63,7 +63,7 @@ inline bool EventEngine<X, single>::apply_next_set(bool on_time)
     assign(search_.before(), step_.x0());
     search_.stay_at_start();
     place_set(step_.instant(0, 0));
-    leave_from_start();
+    leave_from_start(0);
     if (on_time) note_vetoes();
     transform(on_time, false);
     stuck_ = on_time ? no_guard : stuck_guard();
@@ -125,6 +125,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::arm_at_start(bool begins)
 {
     enters_mode_ = false;
+    if (!begins) hold_again();
     enable_guards();
     newly_armed_ = true;
     watching_ = false;
@@ -158,7 +159,9 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
     if (side == Side::plateau)
         bank_.await(i, awaited_side(Cause::start, info, record.acting, side));
     if (arming == Arming::waits) {
-        if (begins && record.acting && is_beyond(side, info.crossing)) count_armed_beyond(i);
+        // One that fires at the start has done so in the run before.
+        const bool is_known = !begins && info.at_start && options_.continues;
+        if (record.acting && is_beyond(side, info.crossing) && !is_known) count_armed_beyond(i);
     } else if (arming != Arming::outside && counts_here(i)) {
         have_event(i, arming, side);
     }
@@ -222,7 +225,8 @@ inline void EventEngine<X, single>::arm_all()
         widest = std::max(widest, bank_[i].band);
     }
     search_.fired().clear();
-    if (system_->moded || changed_holds_) enable_guards();
+    const bool released = changed_holds_;
+    if (system_->moded || released) enable_guards();
     bank_.await_none();
     newly_armed_ = true;
     watching_ = false;
@@ -239,6 +243,15 @@ inline void EventEngine<X, single>::arm_all()
             goes_on = arm_one(i, widest, opens);
         }
     });
+    if (released) forget_enabling();
+}
+
+template <class X, bool single>
+void EventEngine<X, single>::forget_enabling()
+{
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        if (std::as_const(bank_)[i].newly_enabled) bank_[i].newly_enabled = false;
+    }
 }
 
 template <class X, bool single>
@@ -247,7 +260,7 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
     GuardRecord& record = bank_[i];
     const double g = bank_.g0(i);
     if (!std::isfinite(g)) {
-        end(Outcome::non_finite, i);
+        end_not_finite("", i);
         return false;
     }
     const Crossing crossing = record.info.crossing;
@@ -328,7 +341,8 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
         return false;
     }
     if (record.info.boolean || record.info.crossing == Crossing::either) return false;
-    if (!changed_mode_ && !(record.fired && resets_any_ && record.info.resets)) return false;
+    const bool is_member = record.fired && resets_any_ && record.info.resets;
+    if (!changed_mode_ && !is_member && !(on_time_ && changes_on_time())) return false;
     const X& left = search_.before();
     if (left.size() != step_.x0().size()) return false;
     const double t = step_.time(0);
@@ -345,20 +359,30 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
     if (sign_of(side) * moved > noise) return false;
     if (sign_of(side) * moved >= -noise) {  // a vanishing rate has the sign that it has later
         const double ahead = 1e-6 * h_next_;
+        const double then = step_.inside(step_.time(ahead));
         X rate = left_rate_;
-        if (changed_mode_) {
-            // The flow of a mode that has been left is not called any more.
+        X later = step_.x0();
+        if (changed_mode_ || !is_member) {
+            // The flow of a mode that has been left is not called any more; nor is one that a time
+            // event may have changed.
             const double part = left_after_ > 0 ? ahead / left_after_ : 0;
             for_each_component(rate,
                                [&](auto c) { rate[c] += part * (left_rate_[c] - left_start_[c]); });
         } else {
-            X later = step_.x0();
             move(later, left, ahead, left_rate_);
-            step_.flow_in(mode_before_, step_.inside(step_.time(ahead)), later, rate);
+            step_.flow_in(mode_before_, then, later, rate);
         }
-        if (sign_of(side) * guard.rate(t, step_.x0(), rate, h_next_) > noise) return false;
+        move(later, step_.x0(), ahead, left_rate_);
+        if (sign_of(side) * guard.rate(then, later, rate, h_next_) > noise) return false;
     }
     return record.fired || std::fabs(guard.value(t, left)) <= rounding_of(i, step_.mode(), t, left);
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::changes_on_time()
+{
+    return left_known_ &&
+           !(same_state(search_.before(), step_.x0()) && same_state(left_rate_, step_.rate0()));
 }
 
 template <class X, bool single>
@@ -414,7 +438,7 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
     }
     if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
     if (!std::isfinite(rate)) {
-        end(Outcome::non_finite, i);
+        all_finite(step_.rate0()) ? end_not_finite("rate", i) : end_not_finite("flow", no_guard);
         return Side::plateau;
     }
     if (rate != 0 && bank_[i].fired) return side_of(rate);

@@ -160,6 +160,9 @@ public:
 
     [[nodiscard]] const Location& where(std::size_t guard) noexcept { return hit_of(guard).where; }
 
+    /// Offset [s] of the first event of the set that was found.
+    [[nodiscard]] double first_root() noexcept;
+
     /// Side that a guard of the set leaves. Within the step it may have come there from the other.
     [[nodiscard]] Side side_left(std::size_t guard) noexcept { return hit_of(guard).side; }
 
@@ -449,10 +452,10 @@ private:
         }
         add(end);
         // The bits of an event do not depend on where else the guard has been evaluated.
-        if (changes == 1 && resolution_.is_finest()) return Ends{}.examine(probe, watch);
+        if (changes == 1 && resolution_.is_finest()) return Ends::compare_signs(probe, watch);
         for (std::size_t k = 0;; ++k) {
             watch.end = samples[k];
-            const Finding finding = Ends{}.examine(probe, watch);
+            const Finding finding = Ends::compare_signs(probe, watch);
             if (finding.hit || k + 1 == count) return finding;
             watch.side = watch.side_after;
             watch.start = watch.end;
@@ -898,7 +901,11 @@ private:
     /// step if the motion is straight until there.
     void place(const CurrentStep& step, double s, X& x);
 
-    [[nodiscard]] double window_end(const CurrentStep& step) noexcept;
+    [[nodiscard]] double window_end(const CurrentStep& step) noexcept
+    {
+        const double first = first_root();
+        return first + resolution_.window(step.time(first));
+    }
 
     /// The longest time [s] after which a guard of the set that has not left its side at the state
     /// x reaches its surface there, at the offset `at`; 0 if there is none, NaN if it cannot be

@@ -83,13 +83,13 @@ inline void EventSearch<X, single>::place(const CurrentStep& step, double s, X& 
 }
 
 template <class X, bool single>
-inline double EventSearch<X, single>::window_end(const CurrentStep& step) noexcept
+inline double EventSearch<X, single>::first_root() noexcept
 {
     double first = std::numeric_limits<double>::infinity();
     for (const Hit& hit : hits_) {
         if (hit.located) first = std::min(first, hit.where.root);
     }
-    return first + resolution_.window(step.time(first));
+    return first;
 }
 
 template <class X, bool single>

@@ -444,6 +444,9 @@ public:
     /// Guard i right after the last acting instant.
     [[nodiscard]] double armed_value(std::size_t i) const noexcept { return armed_g_[i]; }
 
+    /// [s] where guards were armed last.
+    [[nodiscard]] double armed_at() const noexcept { return armed_at_; }
+
     [[nodiscard]] double g0(std::size_t i) const noexcept { return g0_[i]; }
     [[nodiscard]] double rate0(std::size_t i) const noexcept { return rate0_[i]; }
     void set_rate0(std::size_t i, double rate) noexcept { rate0_[i] = rate; }

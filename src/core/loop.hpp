@@ -60,6 +60,8 @@ public:
             h_next_ = std::min(h_next_, options_.h_max);
         }
         first_step_ = h_next_;
+        this->cuts_before_windows_ =
+            options_.event_window > 0 && !defers_ && (bank_.size() > 1 || timed_);
         flight_start_ = options_.t_start;
         this->refuse_bad_modes();
         if (!step_.flow_fits()) throw_flow_does_not_fit("integrate", components_);
@@ -422,7 +424,9 @@ private:
     /// Ends the run after a failed step.
     void end_step(Outcome outcome) noexcept
     {
-        end(step_.flow_fits() ? outcome : Outcome::wrong_dimension);
+        if (!step_.flow_fits()) return end(Outcome::wrong_dimension);
+        if (outcome == Outcome::non_finite) return this->end_not_finite("flow", no_guard);
+        end(outcome);
     }
 
     void reach_end();
@@ -432,9 +436,11 @@ private:
     {
         if ((timed_ && time_event_due_) || change_due_) {
             mark_everything();
+            const double taken = step_.h();
+            assign(this->left_start_, step_.rate0());
             accept();
             on_change_ = std::exchange(change_due_, false);
-            this->apply_without_guards(timed_ && time_event_due_);
+            this->apply_without_guards(timed_ && time_event_due_, taken);
             return settle_and_record();
         }
         accept();
@@ -579,6 +585,9 @@ private:
         record_restart();
     }
 
+    /// Ends the step before the window of a set, which the next step is to hold as a whole.
+    [[gnu::noinline]] void stop_before_window();
+
     /// Completes what the step has to show before the resets of a set, which may change the flow.
     void show_before_resets();
 
@@ -633,9 +642,22 @@ private:
     /// it is taken after it.
     [[nodiscard]] double before_rounding(double t) const noexcept
     {
-        const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
-        return backward_ ? t + ulps : t - ulps;
+        return backward_ ? t + rounding(t) : t - rounding(t);
     }
+    /// Whether only rounding parts two times.
+    [[nodiscard]] static bool is_rounding(double sample, double t) noexcept
+    {
+        return std::fabs(sample - t) <= rounding(t);
+    }
+    [[nodiscard]] static double rounding(double t) noexcept
+    {
+        return 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+    }
+    /// Whether the step starts where a set has happened: the samples there are the state after it.
+    [[nodiscard]] bool starts_at_set() const noexcept;
+    /// Adds the next sample if only rounding parts it from the events at time t, where the step
+    /// starts.
+    void emit_sample_with(double t);
 
     [[nodiscard]] bool lies_before(double t, double end) const noexcept
     {

@@ -24,13 +24,34 @@ bool Loop<X, single>::search(bool cleared)
         }
     }
     if (error_controlled_ && step_.may_be_rough() && !smooth_step()) return true;
-    if (!this->find(cleared, [&] { show_before_resets(); })) return ended_;
+    const auto find = [&](bool clears) {
+        return this->find(clears, [&] { show_before_resets(); });
+    };
+    bool found = find(cleared);
+    if (!found && this->before_window_ > 0) {
+        stop_before_window();
+        if (!this->any_suspicious()) {
+            this->pass_on_clear();
+            return false;
+        }
+        found = find(false);
+    }
+    if (!found) return ended_;
     const double t = on_time_ ? time_event_ : this->time_of_set();
     record_step_to_set(search_.at(), t);
     limit_next_step(t);
     this->cut_short();
     settle_and_record();
     return true;
+}
+
+template <class X, bool single>
+void Loop<X, single>::stop_before_window()
+{
+    is_last_ = time_event_due_ = false;
+    step_.attempt(std::exchange(this->before_window_, 0));
+    note_change();
+    this->sample_end();
 }
 
 template <class X, bool single>
@@ -54,7 +75,7 @@ inline bool Loop<X, single>::return_to_domain()
         const double h = shorten_into_domain(std::exchange(beyond, false));
         if (is_tentative() || h < smallest_step()) {
             if (!is_tentative() && happen_where_flow_ends(h)) return false;
-            end(Outcome::non_finite, broken);
+            this->end_not_finite("", broken);
             return false;
         }
         ++run_.statistics.rejected;

@@ -19,11 +19,26 @@ void Loop<X, single>::emit_more_samples(double s, double end)
     while (holds(next_sample_)) {
         const double offset = std::min(step_.until(times[next_sample_]), s);
         X x = step_.x0();
-        if (offset > 0) {
+        if (offset > 0 && !(starts_at_set() && is_rounding(times[next_sample_], step_.time(0)))) {
             step_.sample(offset, {options_.rtol, options_.atol, on_polynomial}, x);
         }
         add_sample(std::move(x));
     }
+}
+
+template <class X, bool single>
+bool Loop<X, single>::starts_at_set() const noexcept
+{
+    const double t = step_.start().value;
+    return (guarded_ && bank_.armed_at() == t) || (timed_ && this->passed_ == t);
+}
+
+template <class X, bool single>
+void Loop<X, single>::emit_sample_with(double t)
+{
+    const auto& times = options_.sample_times;
+    const bool due = next_sample_ < times.size() && is_rounding(times[next_sample_], t);
+    if (due && step_.start().value == t) add_sample(X(step_.x0()));
 }
 
 template <class X, bool single>

@@ -37,7 +37,7 @@ void Loop<X, single>::continue_from(const X& x, Mode mode, double h)
     run_.outcome = Outcome::reached_end;
     this->forget_cause();
     search_.fired().clear();
-    this->leave_from_start();
+    this->leave_from_start(0);
     assign(search_.before(), step_.x0());
     this->mode_before_ = step_.mode();
     this->changed_mode_ = mode != step_.mode();

@@ -13,8 +13,11 @@ void Loop<X, single>::restart(double t, const X& x, Mode mode)
     Snapshot old;
     visit_state(SnapshotWriter(old));
     try {
+        this->who_ = "restart";
         start_at(t, x, mode);
+        this->who_ = "integrate";
     } catch (...) {
+        this->who_ = "integrate";
         visit_state(SnapshotReader(old));
         go_on_from_place();
         throw;

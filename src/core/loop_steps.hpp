@@ -25,19 +25,20 @@ bool Loop<X, single>::show_next()
 {
     const auto& samples = run_.trajectory.t;
     const auto& events = run_.events;
-    const bool has_sample = shown_samples_ < samples.size();
     const bool has_event = shows_events() && shown_records_ < events.size();
+    const double t = has_event ? events[shown_records_].t : infinity;
+    if (has_event && shown_samples_ == samples.size()) emit_sample_with(t);
+    const bool has_sample = shown_samples_ < samples.size();
+    const bool together = has_sample && has_event && is_rounding(samples[shown_samples_], t);
     showing_ = Showing::step;
-    if (has_sample &&
-        !(has_event && !lies_before(samples[shown_samples_], events[shown_records_].t))) {
-        ++shown_samples_;
-        showing_ = Showing::sample;
-        return true;
-    }
-    if (has_event) {
-        const double t = events[shown_records_].t;
+    if (has_event && (together || !has_sample || !lies_before(samples[shown_samples_], t))) {
         while (shown_records_ < events.size() && events[shown_records_].t == t) ++shown_records_;
         if (t != step_.start().value) showing_ = Showing::event;
+        if (!together) return true;
+    }
+    if (has_sample) {
+        ++shown_samples_;
+        showing_ = Showing::sample;
         return true;
     }
     const std::uint64_t count = run_.statistics.events;
@@ -136,7 +137,8 @@ inline void Loop<X, single>::reach_end()
         planner_->check_last(step_, bank_, run_.statistics);
         if (planner_->wrong()) return this->name_wrong_bound();
     }
-    end(Outcome::reached_end);
+    // The largest double is no end that a run without an end was meant to reach.
+    end(endless_ ? Outcome::stalled : Outcome::reached_end);
 }
 
 template <class X, bool single>

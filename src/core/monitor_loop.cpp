@@ -41,8 +41,8 @@ void throw_held_moved(std::size_t component, double expected, double found)
 void throw_beyond_time_event(double event, double end)
 {
     throw OutOfTurn(fmt::format(
-        "EventMonitor: found a step that ends at {:.17g} s; expected no step beyond the time "
-        "event at {:.17g} s, see `must_stop_at`",
+        "EventMonitor: found a step or `hold` to {:.17g} s; expected none beyond the time event at "
+        "{:.17g} s, see `must_stop_at`",
         end, event));
 }
 
@@ -67,6 +67,12 @@ void throw_no_length(std::string_view what, double found)
     throw std::invalid_argument(
         fmt::format("EventMonitor: found {} s for {}; expected a finite time, and lengths above 0",
                     found, what));
+}
+
+void throw_hold_not_ahead(double now, double found)
+{
+    throw std::invalid_argument(fmt::format(
+        "EventMonitor: found `hold` to {} s; expected a finite time after {:.17g} s", found, now));
 }
 
 void throw_wrong_size(std::size_t expected, std::size_t found)

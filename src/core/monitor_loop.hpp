@@ -23,6 +23,7 @@ namespace ricochet::detail {
 [[noreturn]] void throw_held_moved(std::size_t component, double expected, double found);
 /// @throws std::logic_error because the step goes beyond a time event.
 [[noreturn]] void throw_beyond_time_event(double event, double end);
+[[noreturn]] void throw_hold_not_ahead(double now, double found);
 /// @throws std::logic_error because guards have to be examined before that time.
 [[noreturn]] void throw_not_quiet(double until, double found);
 /// @throws std::invalid_argument for a length, time or scale that is not a positive or finite
@@ -129,7 +130,7 @@ public:
     {
         if (!resting_ || ended_) throw_out_of_turn("hold", "it after a verdict `rests` alone");
         if (!lies_before(step_.start().value, t) || !std::isfinite(t)) {
-            throw_no_length("the time of `hold`", t);
+            throw_hold_not_ahead(step_.start().value, t);
         }
         const bool due = timed_ && !lies_before(t, time_event_);
         if (due && t != time_event_) throw_beyond_time_event(time_event_, t);
@@ -381,13 +382,14 @@ private:
             step_.restart(step_.start(), step_.x0(), step_.mode());
             return Verdict::ended;
         }
+        if (time_event_due_) assign(this->left_start_, step_.rate0());
         step_.accept_shown();
         ++run_.statistics.steps;
         this->last_h_ = step.h;
         if (!time_event_due_) return Verdict::stands;
         cut_.s = step.h;
         step_.hold(time_event_);
-        this->apply_time_event();
+        this->apply_time_event(step.h);
         return show_set();
     }
 
@@ -407,7 +409,7 @@ private:
         std::size_t broken = bank_.first_not_finite();
         if (broken == no_guard) broken = bank_.first_without_rate();  // the host no longer has it
         if (broken == no_guard) return this->find(cleared);
-        this->end(Outcome::non_finite, broken);
+        this->end_not_finite("", broken);
         return false;
     }
 

@@ -119,6 +119,9 @@ protected:
                 difference(at, rates);
             }
             calls += 2 * size();
+        } else if (shares_states(at)) {
+            difference_each(at, calls, rates);
+            return;
         } else {
             for (std::size_t i = 0; i < size(); ++i) {
                 const double known = g ? (*g)[i] : std::numeric_limits<double>::quiet_NaN();
@@ -177,6 +180,44 @@ protected:
         for (std::size_t i = 0; i < size(); ++i) {
             const double slope = (rates[i] - behind_[i]) / (2 * delta);
             rates[i] = records_[i].info.boolean ? 0 : backward_ ? -slope : slope;
+        }
+    }
+
+    /// Whether each guard would move a whole large state for its difference.
+    [[nodiscard]] bool shares_states(const SamplePoint<X>& at) const noexcept
+    {
+        if constexpr (single || is_small<X>) return false;
+        return size() > 1 && !system_->each_rate && !system_->rated && !system_->guard_on &&
+               system_->calls_of_rate == 2 && !system_.is_near_end(at.motion.t, 1e-5 * at.scale);
+    }
+
+    /// Differences of guards that are evaluated one by one, at the same two states.
+    void difference_each(const SamplePoint<X>& at, std::uint64_t& calls, Doubles& rates)
+    {
+        const double delta = 1e-5 * at.scale;
+        const double ahead = backward_ ? -delta : delta;
+        if (there_.size() != at.motion.x.size()) there_ = at.motion.x;
+        const auto sample = [&](double s, double later, Doubles& g) {
+            detail::move(there_, at.motion.x, s, at.motion.s);
+            for (std::size_t i = 0; i < size(); ++i) {
+                if (is_rateless(i)) continue;
+                g[i] =
+                    system_->guard(system_.door(), i, at.motion.mode, at.motion.t + later, there_);
+            }
+        };
+        sample(delta, ahead, rates);
+        sample(-delta, -ahead, behind_);
+        for (std::size_t i = 0; i < size(); ++i) {
+            if (is_rateless(i)) {
+                rates[i] = 0;
+                continue;
+            }
+            rates[i] = (rates[i] - behind_[i]) / (2 * delta);
+            if (is_finite(rates[i])) {
+                calls += 2;
+            } else {
+                rates[i] = rate_alone(i, at, calls);
+            }
         }
     }
 

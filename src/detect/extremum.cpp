@@ -229,6 +229,22 @@ Finding clear_if(bool known) noexcept
 
 }  // namespace
 
+bool Ends::turns_back(GuardPath& path, const Watch& watch)
+{
+    const double sign = watch.side == Side::above ? 1 : -1;
+    const double end = watch.end.s, width = path.h();
+    for (const double part : {1.0 / 64, 1.0 / 8, 1.0}) {
+        if (end + part * width > path.latest()) break;
+        const double beyond = path.value(end + part * width).value;
+        if (beyond != 0) return sign * beyond > 0;
+    }
+    if (end < path.latest()) return false;  // it stays there
+    // At the end of the run: of a crossing the value is halved over half the way, of a touch
+    // quartered.
+    const double away = std::min(width / 64, (end - watch.start.s) / 2);
+    return sign * path.value(end - away / 2).value < 0.375 * sign * path.value(end - away).value;
+}
+
 Finding Extremum::examine(GuardPath& path, Watch& watch) const
 {
     const Side side = watch.side;

@@ -22,6 +22,19 @@ std::string guard_called(std::size_t which, std::string_view name)
 
 }  // namespace
 
+std::string reason_not_finite(std::string_view function, std::size_t which,
+                              std::string_view name) noexcept
+{
+    try {
+        if (function.empty()) return guard_called(which, name);
+        if (function == "flow") return "the flow";
+        if (which == no_guard) return "the time reset";
+        return fmt::format("the {} of {}", function, guard_called(which, name));
+    } catch (const std::bad_alloc&) {
+        return {};
+    }
+}
+
 void throw_wrong_tolerances(std::size_t components, std::size_t tolerances)
 {
     throw std::invalid_argument(

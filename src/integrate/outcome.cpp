@@ -51,7 +51,9 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::stopped_by_event: return "an event ended the run, as asked";
         case Outcome::zeno:
             return "the motion presses on its guard, or its events accumulate there, and nothing "
-                   "stops it; let it come to rest there (a system by its rest, a scene by its "
+                   "stops it; let it come to rest there (a system by its rest, or, where its "
+                   "surface "
+                   "moves or `rest` mixes components, by a mode of its own; a scene by its "
                    "contacts), or end the run earlier";
         case Outcome::outside_mode:
             return "a reset left the state behind a guard that bounds the motion; "
@@ -90,9 +92,9 @@ std::string_view describe(Outcome outcome) noexcept
                    "left the mode as it was; write into the components that are there, or declare "
                    "`static constexpr bool changes_dimension = true`";
         case Outcome::stalled:
-            return "stall_steps steps hardly advanced the time; end the run earlier, let events "
-                   "that "
-                   "accumulate come to rest, or raise max_steps or stall_steps";
+            return "stall_steps steps hardly advanced the time, or nothing ended a run without an "
+                   "end; end the run earlier, let events that accumulate come to rest, or raise "
+                   "max_steps or stall_steps";
         case Outcome::stopped_by_callback:
             return "a function of the system reported an error; all that was computed before is "
                    "kept, and the next call continues from the last completed step";
@@ -131,11 +133,19 @@ std::string describe(const Statistics& statistics, std::span<const std::string> 
     return out;
 }
 
+std::string detail::describe_reason(Outcome outcome, const std::string& reason)
+{
+    if (outcome != Outcome::non_finite) return "a reset ended the run: " + reason;
+    return reason +
+           " returned NaN or infinity, or led to a state that is not finite; the last finite state "
+           "is kept";
+}
+
 std::string detail::describe_run(Outcome outcome, const std::string& reason,
                                  const std::vector<std::size_t>& armed_beyond)
 {
     std::string out(describe(outcome));
-    if (!reason.empty()) out = "a reset ended the run: " + reason;
+    if (!reason.empty()) out = describe_reason(outcome, reason);
     if (armed_beyond.empty()) return out;
     out += armed_beyond.size() == 1 ? "; guard " : "; guards ";
     for (std::size_t i = 0; i < armed_beyond.size(); ++i) {

@@ -248,7 +248,13 @@ TEST(Driving, ABadRestartIsRefusedAndChangesNothing)
     EXPECT_THROW(simulation.restart(2, Two{1, 0}), std::invalid_argument);
     EXPECT_THROW(simulation.restart(t, Two{1, nan}), std::invalid_argument);
     EXPECT_THROW(simulation.restart(t, Two{1, 0}, 1), std::invalid_argument);
-    EXPECT_THROW(simulation.restart(t, Two{-1, 0}), std::invalid_argument);  // below the floor
+    try {
+        simulation.restart(t, Two{-1, 0});  // below the floor
+        FAIL();
+    } catch (const std::invalid_argument& refused) {
+        EXPECT_EQ(std::string(refused.what()).rfind("restart: the start lies behind", 0), 0U)
+            << refused.what();
+    }
     EXPECT_EQ(simulation.t(), t);
     EXPECT_EQ(simulation.take().x, undisturbed.take().x);
     EXPECT_THROW(simulation.restart(t, Two{1, 0}), std::invalid_argument);  // it is over

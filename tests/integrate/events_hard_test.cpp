@@ -340,6 +340,37 @@ TEST(HardEvents, AGuardAfterTheWindowOfASetKeepsItsOwnTime)
     }
 }
 
+TEST(HardEvents, AWindowIsHeldByOneStepWhereverTheStepsEnd)
+{
+    // (t - 1) (t - 1.05), which turns back in the window, and 1.08 - t.
+    struct Window {
+        using State = std::array<double, 2>;
+        std::size_t guard_count = 2;
+        void flow(double, const State&, State& dxdt) const { dxdt = {0, 0}; }
+        [[nodiscard]] double guard(std::size_t which, double t, const State&) const
+        {
+            return which == 0 ? (t - 1) * (t - 1.05) : 1.08 - t;
+        }
+        void reset(std::size_t which, double, State& x) const { ++x[which]; }
+    };
+    const auto check = [](const auto& run, double step) {
+        EXPECT_EQ(run.x, (Window::State{1, 1})) << step;
+        ASSERT_EQ(run.events.size(), 2U) << step;
+        EXPECT_NEAR(run.events[0].t, 1.08, 1e-14) << step;
+        EXPECT_EQ(run.events[0].t, run.events[1].t) << step;
+    };
+    Options options{.t_end = 2, .event_window = 0.1};
+    for (int k = 0; k <= 20; ++k) {
+        options.step = 0.11 + 0.01 * k;
+        check(integrate(Window{}, {0, 0}, options, FixedStep<Rk4>{}), options.step);
+        check(integrate(Window{}, {0, 0}, options, FixedStep<Rk4>{}, Extremum{}, Bisection{}),
+              options.step);
+        options.h_max = options.step;
+        check(integrate(Window{}, {0, 0}, options), options.step);
+        options.h_max = std::numeric_limits<double>::infinity();
+    }
+}
+
 /// A guard that swings about its surface, and a reset that counts its events.
 struct Swinging {
     static constexpr double frequency = 100;  ///< [rad/s]

@@ -161,6 +161,90 @@ TEST(Held, ASavedSlideGoesOnWithTheSameBits)
     EXPECT_EQ(rest.statistics.events, 1U);
 }
 
+TEST(Held, ARunThatContinuesFromARestIsHeldAgain)
+{
+    const auto check = [](const auto& system, const auto& stepping, double step) {
+        const auto first = integrate(system, {0, 0.1, 1, 0},
+                                     {.t_end = 1.5, .step = step, .rtol = 1e-10}, stepping);
+        const auto run = integrate(
+            system, first.x,
+            {.t_start = 1.5, .t_end = 4, .continues = true, .step = step, .rtol = 1e-10}, stepping);
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        EXPECT_TRUE(times_of(run, EventKind::accumulation).empty());
+        EXPECT_EQ(run.statistics.armed_beyond, 0U);
+        EXPECT_NEAR(run.x[0], 4, 1e-12);
+        EXPECT_EQ(run.x[1], system.floor);
+        EXPECT_EQ(run.x[3], 0);
+    };
+    struct Unilateral : Thrown {
+        bool unilateral = true;
+    };
+    check(Thrown{}, ErrorControlled<Dopri5>{}, 0);
+    check(Thrown{}, FixedStep<Rk4>{}, 0.01);
+    check(Recorded{}, ErrorControlled<Fehlberg78>{}, 0);
+    check(Formulas{}, ErrorControlled<Taylor>{}, 0);
+    check(Unilateral{}, ErrorControlled<Dopri5>{}, 0);
+}
+
+TEST(Held, ARestartOfARestIsHeldUnlessItMovesWhatIsHeld)
+{
+    Simulation simulation(Thrown{}, {0, 0.1, 1, 0}, {.t_end = 4});
+    while (simulation.t() < 1.5) ASSERT_TRUE(simulation.step());
+    simulation.restart(1.5, {1.5, 0, 2, 0});
+    while (simulation.step()) {
+    }
+    EXPECT_NEAR(simulation.x()[0], 6.5, 1e-12);
+    EXPECT_EQ(simulation.x()[1], 0);
+    simulation.restart(1, {1, 0, 1, 2});  // kicked up, it rests again after 0.8 s
+    const auto kicked = simulation.take();
+    EXPECT_EQ(kicked.x[1], 0);
+    EXPECT_NEAR(kicked.x[0], 4, 1e-12);
+    EXPECT_EQ(times_of(kicked, EventKind::accumulation).size(), 2U);
+    EXPECT_EQ(kicked.statistics.armed_beyond, 0U);
+}
+
+TEST(Held, ARestartBeyondASurfaceIsCounted)
+{
+    Simulation simulation(Thrown{}, {0, 0.1, 1, 0}, {.t_end = 4});
+    while (simulation.t() < 1.5) ASSERT_TRUE(simulation.step());
+    simulation.restart(1.5, {1.5, 0, 1, -1});
+    const auto run = simulation.take();
+    EXPECT_EQ(run.statistics.armed_beyond, 1U);
+    EXPECT_EQ(run.armed_beyond, std::vector<std::size_t>{0});
+}
+
+TEST(Held, ARunThatIsSavedAfterAReleaseIsTheSameRun)
+{
+    // The first ball is lifted off its floor while the second still bounces.
+    struct Balls {
+        using State = std::array<double, 4>;
+        std::size_t guard_count = 2;
+        void flow(double t, const State& x, State& dxdt) const
+        {
+            dxdt = {x[2], x[3], 10 * std::min(t - 1, 0.1), -1};
+        }
+        [[nodiscard]] double guard(std::size_t which, double, const State& x) const
+        {
+            return x[which];
+        }
+        void reset(std::size_t which, double, State& x) const
+        {
+            x[which] = 0;
+            x[which + 2] *= -0.5 - 0.4 * static_cast<double>(which);
+        }
+        void rest(std::size_t which, double, State& x) const { x[which] = x[which + 2] = 0; }
+    };
+    Simulation simulation(Balls{}, {0.01, 0.1, 0, 0}, {.t_end = 3});
+    while (times_of(simulation.run(), EventKind::mode).empty()) ASSERT_TRUE(simulation.step());
+    Simulation other(Balls{}, {0.01, 0.1, 0, 0}, {.t_end = 3});
+    other.restore(simulation.save());
+    while (simulation.step()) {
+        ASSERT_TRUE(other.step());
+        ASSERT_EQ(to_text(other.save()), to_text(simulation.save())) << simulation.t();
+    }
+    EXPECT_EQ(other.x(), simulation.x());
+}
+
 // --- what goes free ---
 
 /// A ball that is pulled by `pull(t)`; the floor has e = 0.5, and throws it up by `launch` where
@@ -205,14 +289,19 @@ TEST(Held, ALiftSetsTheBallFree)
     // From 1 s on the weight is lifted by 10 N/s per kg: at 2 s it hangs free, then
     // v = 5 (t - 2)^2 and x = 5/3 (t - 2)^3.
     const auto lift = [](double t) { return t < 1 ? -10 : -10 + 10 * (t - 1); };
-    for (const double tick : {1.0, infinity}) {
-        const auto run =
-            integrate(Pulled{.pull = lift, .tick = tick}, {0.2, 0}, {.t_end = 3, .rtol = 1e-10});
+    const auto expect_lift = [](const auto& run) {
         EXPECT_EQ(run.outcome, Outcome::reached_end);
-        expect_near(times_of(run, EventKind::accumulation), {0.6}, 1e-12);
         expect_near(times_of(run, EventKind::mode), {2}, 1e-12);
         EXPECT_NEAR(run.x[0], 5.0 / 3, 1e-9);
         EXPECT_NEAR(run.x[1], 5, 1e-9);
+    };
+    for (const double tick : {1.0, infinity}) {
+        const Pulled pulled{.pull = lift, .tick = tick};
+        const auto run = integrate(pulled, {0.2, 0}, {.t_end = 3, .rtol = 1e-10});
+        expect_near(times_of(run, EventKind::accumulation), {0.6}, 1e-12);
+        expect_lift(run);
+        expect_lift(integrate(pulled, {0, 0},
+                              {.t_start = 0.7, .t_end = 3, .continues = true, .rtol = 1e-10}));
     }
 }
 
@@ -255,6 +344,35 @@ struct Ledge : Thrown {
         return mode;
     }
 };
+
+TEST(Held, AVetoSetsTheBallFree)
+{
+    // The platform is there until 2 s, or as far as x = 2.
+    struct Platform : Thrown {
+        bool by_place = false;
+        [[nodiscard]] bool enabled(double t, const State& x) const
+        {
+            return (by_place ? x[0] : t) < 2;
+        }
+    };
+    for (const bool by_place : {false, true}) {
+        for (const double speed : {1.0, 0.0}) {
+            if (by_place && speed == 0) continue;
+            Platform platform;
+            platform.by_place = by_place;
+            for (const bool fixed : {false, true}) {
+                const Options options{.t_end = 3, .step = fixed ? 0.013 : 0, .rtol = 1e-10};
+                const auto run =
+                    fixed ? integrate(platform, {0, 0.1, speed, 0}, options, FixedStep<Rk4>{})
+                          : integrate(platform, {0, 0.1, speed, 0}, options);
+                SCOPED_TRACE(speed);
+                expect_near(times_of(run, EventKind::mode), {2}, 1e-9);
+                EXPECT_NEAR(run.x[1], -5, 1e-7);
+                EXPECT_NEAR(run.x[0], 3 * speed, 1e-12);
+            }
+        }
+    }
+}
 
 TEST(Held, AChangeOfModeSetsTheBallFree)
 {

@@ -207,6 +207,20 @@ TEST(Instants, ATouchAtATickStaysATouch)
     }
 }
 
+TEST(Instants, ATouchAtATickIsNoCrossingForTheSignsAtTheEndsOfSteps)
+{
+    for (const double end : {1.0, 3.0}) {
+        for (const double step : {0.25, 0.09}) {
+            const auto run = integrate(TouchAtTick{}, One{0}, {.t_end = end, .step = step},
+                                       FixedStep<Rk4>{}, Ends{});
+            SCOPED_TRACE("steps of " + std::to_string(step) + " to " + std::to_string(end));
+            ASSERT_EQ(run.events.size(), 1U);
+            EXPECT_EQ(run.events[0].kind, EventKind::time);
+            EXPECT_EQ(run.mode, 0U);
+        }
+    }
+}
+
 /// x' = 1 with a guard that sets the clock back, and no ticks.
 struct Clock {
     using State = One;
@@ -245,6 +259,42 @@ TEST(Instants, ASampleAtAnEventIsTakenAfterItWhateverTheRounding)
                        }
                    });
     }
+}
+
+TEST(Instants, ASampleAtAnEventIsItsStateAfterAndOneStop)
+{
+    for (const double period : {1.0, 0.3, 0.1, 1.0 / 3, 0.001}) {
+        Options options{.t_end = 100.5 * period};
+        for (int n = 1; n <= 100; ++n) options.sample_times.push_back(n * period);
+        const auto check = [&](auto&& simulation, const std::string& label) {
+            SCOPED_TRACE(label + ", period " + std::to_string(period));
+            std::size_t stops = 0;
+            while (simulation.advance()) {
+                ASSERT_LT(stops, 100U);
+                EXPECT_EQ(simulation.t(), options.sample_times[stops++]);
+                EXPECT_EQ(simulation.x(), simulation.run().events.back().after);
+            }
+            EXPECT_EQ(stops, 100U);
+            EXPECT_EQ(simulation.run().events.size(), 100U);
+        };
+        check(Simulation(Clock{period}, One{0}, options), "dopri5");
+        options.step = period / 7;
+        check(Simulation(Clock{period}, One{0}, options, FixedStep<Rk4>{}), "rk4");
+        // The same samples without stops.
+        const auto run = integrate(Clock{period}, One{0}, options, FixedStep<Rk4>{});
+        for (const auto& x : run.trajectory.x) EXPECT_EQ(x, One{0});
+    }
+}
+
+TEST(Instants, ASampleAtTheEventThatEndsTheRunIsOneStop)
+{
+    struct Ending : Clock {
+        [[nodiscard]] GuardInfo guard_info() const { return {.stop_after = 2}; }
+    };
+    Simulation simulation(Ending{}, One{0}, {.t_end = 5, .sample_times = {0.5, 1, 2, 3}});
+    std::vector<double> stops;
+    while (simulation.advance()) stops.push_back(simulation.t());
+    EXPECT_EQ(stops, (std::vector<double>{0.5, 1, 2}));
 }
 
 // --- flows that jump at time events ---
@@ -482,6 +532,25 @@ struct OldMode {
 };
 
 // --- the direction of a crossing ---
+
+TEST(Instants, AResetThatActsInOneDirectionOnlyIsNotIneffective)
+{
+    struct UpOnly {
+        using State = One;
+        Crossing crossing = Crossing::either;
+        void flow(double, const State&, State& dxdt) const { dxdt = {0}; }
+        [[nodiscard]] double guard(double t, const State&) const { return std::sin(t); }
+        void reset(Crossing direction, double, State& x) const
+        {
+            if (direction == Crossing::rising) x[0] += 1;
+        }
+    };
+    const auto run = integrate(UpOnly{}, One{0}, {.t_start = 0.1, .t_end = 20, .h_max = 0.5});
+    EXPECT_EQ(run.x[0], 3);
+    EXPECT_EQ(run.statistics.events, 6U);
+    EXPECT_EQ(run.statistics.ineffective_resets, 0U);
+    EXPECT_EQ(run.statistics.declined_guard, no_guard);
+}
 
 /// Counts the turns of sin t: up and down, in a mode each or without.
 struct Turns {

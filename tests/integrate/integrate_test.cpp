@@ -469,6 +469,10 @@ TEST(Integrate, AFlowThatFailsMidwayKeepsWhatWasComputed)
     const auto fixed =
         integrate(Failing{}, {10.0, 0.0}, {.t_end = 2, .step = 0.1}, FixedStep<Rk4>{});
     EXPECT_EQ(fixed.outcome, Outcome::non_finite);
+    EXPECT_EQ(fixed.reason, "the flow");
+    EXPECT_EQ(describe(controlled),
+              "the flow returned NaN or infinity, or led to a state that is not finite; the last "
+              "finite state is kept");
     EXPECT_GT(fixed.t, 0.89);
     EXPECT_EQ(fixed.events.size(), 1u);
 }
@@ -484,6 +488,7 @@ TEST(Integrate, AGuardThatFailsEndsTheRun)
         integrate(Blind{}, {0.0, 0.0}, {.t_end = 1, .step = 0.1}, FixedStep<Rk4>{}, Ends{});
     EXPECT_EQ(run.outcome, Outcome::non_finite);
     EXPECT_EQ(run.guard, 0u);
+    EXPECT_EQ(run.reason, "guard 0");
     EXPECT_LT(run.t, 0.5);
 }
 
@@ -497,6 +502,7 @@ TEST(Integrate, AResetThatFailsEndsTheRunAtItsEvent)
     };
     const auto run = integrate(Broken{}, {0.5, 0.0}, {.t_end = 1});
     EXPECT_EQ(run.outcome, Outcome::non_finite);
+    EXPECT_EQ(run.reason, "the reset of guard 0");
     ASSERT_EQ(run.events.size(), 1u);
     EXPECT_NEAR(run.events[0].t, 0.5, 1e-15);
 }

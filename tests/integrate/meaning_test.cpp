@@ -550,6 +550,105 @@ TEST(Meaning, ATickThatStartsAMotionIntoASurfaceHasItsEvent)
     }
 }
 
+/// x' = v + pull(t), v' = 0 from x = 0 and v = 0 at a guard x that sets v to zero.
+Ticking<Array<2>> stopped_at_zero(double* pull)
+{
+    Ticking<Array<2>> machine;
+    machine.mode_count_ = 1;
+    machine.ticks = {1};
+    machine.f = [pull](Mode, double, const auto& x, auto& dxdt) { dxdt = {x[1] + *pull, 0}; };
+    machine.g = [](std::size_t, Mode, double, const auto& x) { return x[0]; };
+    machine.r = [pull](std::size_t, Mode, double, auto& x) -> Mode {
+        x[1] = *pull = 0;
+        return 0;
+    };
+    return machine;
+}
+
+TEST(Meaning, ATickThatMovesAStandingGuardOutwardInTheSameModeHasItsEvent)
+{
+    double pull = 0;
+    auto by_state = stopped_at_zero(&pull);
+    by_state.tick = [](Mode m, double, auto& x) {
+        x[1] = -1;
+        return m;
+    };
+    auto by_flow = stopped_at_zero(&pull);
+    by_flow.tick = [&](Mode m, double, auto&) {
+        pull = -1;
+        return m;
+    };
+    auto by_time = stopped_at_zero(&pull);
+    by_time.f = [](Mode, double t, const auto& x, auto& dxdt) {
+        dxdt = {x[1] - (t > 1 && t <= 2 ? 1 : 0), 0};
+    };
+    by_time.r = [](std::size_t, Mode, double, auto& x) -> Mode {
+        x[1] = 1;
+        return 0;
+    };
+    by_time.ticks = {1, 2};
+    for (const auto* machine : {&by_state, &by_flow, &by_time}) {
+        pull = 0;
+        by_all(*machine, Array<2>{0, 0}, {.t_end = 1.5},
+               [&](const auto& run, const std::string& label) {
+                   ASSERT_EQ(run.events.size(), 2U) << label;
+                   EXPECT_EQ(run.events[1].t, 1) << label;
+                   EXPECT_EQ(run.events[1].guard, 0U) << label;
+                   EXPECT_EQ(run.x[0], 0) << label;
+                   pull = 0;
+               });
+    }
+}
+
+TEST(Meaning, ATickThatDoesNothingToAGuardOnItsSurfaceHasNoEventOfIt)
+{
+    // It stays where it is, is lifted, goes on outward from a crossing before, or touches from
+    // beyond its surface, as x - (t - 1)^2 does.
+    const auto expect = [](int events, Array<2> x0, double bend, double kick) {
+        Ticking<Array<2>> machine;
+        machine.mode_count_ = 1;
+        machine.ticks = {1};
+        machine.f = [](Mode, double, const auto& x, auto& dxdt) { dxdt = {x[1], 0}; };
+        machine.g = [=](std::size_t, Mode, double t, const auto& x) {
+            return x[0] - bend * (t - 1) * (t - 1);
+        };
+        machine.r = [](std::size_t, Mode m, double, auto& x) {
+            x[1] -= 1e-3;
+            return m;
+        };
+        machine.tick = [=](Mode m, double, auto& x) {
+            x[1] += kick;
+            return m;
+        };
+        by_all(machine, x0, {.t_end = 1.5}, [&](const auto& run, const std::string& label) {
+            const auto crossings =
+                std::count_if(run.events.begin(), run.events.end(),
+                              [](const auto& event) { return event.kind == EventKind::crossing; });
+            EXPECT_EQ(crossings, events) << label << ' ' << x0[0] << ' ' << bend << ' ' << kick;
+        });
+    };
+    expect(0, {0, 0}, 0, 0);
+    expect(0, {0, 0}, 0, 1);
+    expect(0, {0, 0}, 1, 0);
+    expect(0, {0, 0}, 1, -0.1);
+    expect(1, {0.5, -0.5}, 0, -1);
+}
+
+TEST(Meaning, AHostsTickThatMovesAStandingGuardOutwardHasItsEvent)
+{
+    double pull = 0;
+    auto machine = stopped_at_zero(&pull);
+    machine.tick = [](Mode m, double, auto& x) {
+        x[1] = -1;
+        return m;
+    };
+    EventMonitor monitor(machine, Array<2>{});
+    const auto host = test::drive(machine, monitor, Array<2>{0, 0}, 1.5, 0.1);
+    ASSERT_EQ(host.events.size(), 2U);
+    EXPECT_EQ(host.events[1].t, 1);
+    EXPECT_EQ(host.x[0], 0);
+}
+
 TEST(Meaning, ATriangleWaveAndAStaircaseOfModesHaveEveryEvent)
 {
     Machine<Array<1>> wave;

@@ -452,13 +452,14 @@ TEST(Monitor, TimeEventsEndTheirSteps)
     const Clock system;
     EventMonitor monitor(system, X{});
     const auto run = drive(system, monitor, X{0, 0}, 4.5, 0.3);
-    // Speeds 0, 1, 2: the height 2.5 is met at 2.75.
-    ASSERT_EQ(run.cuts.size(), 5u);
-    const std::array<double, 5> times{1, 2, 2.75, 3, 4};
+    // Speeds 0, 1, 2: the height 2.5 is met at 2.75, and again by the strikes at 3 and 4.
+    ASSERT_EQ(run.cuts.size(), 7u);
+    const std::array<double, 7> times{1, 2, 2.75, 3, 3, 4, 4};
     for (std::size_t k = 0; k < times.size(); ++k) {
         EXPECT_NEAR(run.cuts[k].t.value, times[k], 1e-14);
-        EXPECT_EQ(run.cuts[k].on_time, k != 2);
+        EXPECT_EQ(run.cuts[k].on_time, k != 2 && k != 4 && k != 6);
     }
+    EXPECT_NEAR(run.x[0], 2.5, 1e-14);
 }
 
 /// A ball that a clock sends up again.
@@ -905,6 +906,13 @@ TEST(MonitorRefusals, HoldsWithoutEnd)
     EXPECT_EQ(monitor.must_stop_at(), inf);
     for (const double t : {inf, -inf, nan, 1.0, 0.0}) {
         EXPECT_THROW((void)monitor.hold(t), std::invalid_argument) << t;
+    }
+    try {
+        (void)monitor.hold(0.5);
+        FAIL();
+    } catch (const std::invalid_argument& refused) {
+        EXPECT_STREQ(refused.what(),
+                     "EventMonitor: found `hold` to 0.5 s; expected a finite time after 1 s");
     }
     EXPECT_EQ(monitor.hold(2), Verdict::rests);
     EXPECT_EQ(monitor.t().value, 2);

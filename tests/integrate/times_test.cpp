@@ -511,6 +511,24 @@ TEST(Endless, AnEventEndsARunWithoutAnEnd)
     EXPECT_EQ(steps.outcome, Outcome::step_limit);
 }
 
+TEST(Endless, ARunThatNothingEndsStalls)
+{
+    // A guard that is never reached by a motion that stands still, or recedes.
+    struct Receding {
+        using State = std::array<double, 1>;
+        double rate = 0;
+        void flow(double, const State&, State& dxdt) const { dxdt = {rate}; }
+        [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
+        [[nodiscard]] GuardInfo guard_info() const { return {.stop_after = 1}; }
+    };
+    for (const double rate : {0.0, 1.0}) {
+        const auto run = integrate(Receding{rate}, {1}, {.t_end = infinity});
+        EXPECT_EQ(run.outcome, Outcome::stalled) << rate;
+        EXPECT_EQ(describe(run).rfind("stall_steps steps hardly advanced the time, or nothing", 0),
+                  0U);
+    }
+}
+
 TEST(Endless, WhereNothingEndsTheRunItIsRefused)
 {
     EXPECT_EQ(refusal([] { (void)integrate(Decay{}, {1}, {.t_end = infinity}); }),

@@ -219,6 +219,18 @@ def test_a_reset_ends_the_run():
     assert simulation.run_to_end().reason == "empty"
 
 
+def test_solve_ivp_says_why_a_reset_ended_it():
+    def floor(t, y):
+        return y[0]
+
+    def stop(t, y):
+        raise Stop("empty")
+
+    floor.reset = stop
+    result = ricochet.solve_ivp(lambda t, y: [-1.0], (0, 5), [1.0], events=floor)
+    assert result.status == 1 and result.message == "a reset ended the run: empty"
+
+
 def test_time_resets_and_resets_of_sets_end_the_run_in_a_mode():
     ticks = System(lambda mode, t, x: [0.0], modes=("on", "off"), time_events=every(1),
                    time_reset=lambda mode, t, x: Stop("done", ("off", [t])) if t > 2 else mode)

@@ -29,6 +29,11 @@ struct StartRefused : std::invalid_argument {
 /// @throws std::invalid_argument: a unilateral guard that does not fall.
 [[noreturn]] void throw_unilateral_not_falling(std::string_view who, std::size_t which,
                                                std::string_view name);
+/// Which function was not finite, for `Run::reason`: "the flow", or `function` of a guard, empty
+/// for the guard itself; empty where there is no memory.
+[[nodiscard]] std::string reason_not_finite(std::string_view function, std::size_t which,
+                                            std::string_view name) noexcept;
+
 /// @throws std::invalid_argument: an invalid tolerance of touches.
 [[noreturn]] void throw_bad_touch(std::string_view who, std::size_t which, std::string_view name,
                                   double touch);

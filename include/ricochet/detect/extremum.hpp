@@ -35,15 +35,30 @@ struct Ends {
         return sign * end.value < 0;
     }
 
-    [[nodiscard]] Finding examine(GuardPath& probe, Watch& watch) const
+    /// Where the guard is zero at the end, bit for bit, its values around there tell whether it
+    /// crosses or turns back.
+    [[nodiscard]] Finding examine(GuardPath& path, Watch& watch) const
+    {
+        if (watch.end.value == 0 && watch.side != Side::plateau && turns_back(path, watch)) {
+            watch.side_after = watch.side;
+            return Finding::clear(Evidence::assumed);
+        }
+        return compare_signs(path, watch);
+    }
+
+    /// Finding from the sides alone; zero belongs to either.
+    [[nodiscard]] static Finding compare_signs(const GuardPath& path, Watch& watch)
     {
         const bool left = has_left(watch.side, watch.end.value);
         watch.side_after = left ? opposite(watch.side) : watch.side;
-        if (left && counts(watch.side, probe.crossing())) {
+        if (left && counts(watch.side, path.crossing())) {
             return Finding::leaving(watch.side, watch.start, watch.end);
         }
         return Finding::clear(Evidence::assumed);
     }
+
+private:
+    [[nodiscard]] static bool turns_back(GuardPath& path, const Watch& watch);
 };
 
 // The classical approach: the guard and its rate at both ends of the step.

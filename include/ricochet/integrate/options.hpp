@@ -20,7 +20,8 @@ struct Options {
     double t_end = std::numeric_limits<double>::quiet_NaN();
     Mode mode = 0;  ///< mode at the start
     /// The run goes on where another has ended: t_start belongs to that one, so that nothing
-    /// happens there by `Times` of the system or by `GuardInfo::at_start`.
+    /// happens there by `Times` of the system or by `GuardInfo::at_start`, and what a rest held is
+    /// held again.
     bool continues = false;
 
     /// [s] Length of the steps of a fixed-step run, where it is required; with error control the

@@ -45,7 +45,7 @@ enum class Outcome {
     not_converged,         ///< a set-valued stage could not be solved however short the step
     time_event_not_ahead,  ///< `next_time_event(t)` returned a time that is not after t
     wrong_dimension,       ///< the flow or a reset left a state of another dimension
-    stalled,               ///< `Options::stall_steps` steps hardly advanced the time
+    stalled,               ///< steps hardly advanced the time, or an endless run met no end
     stopped_by_callback,   ///< a function of the system reported an error, see `ricochet.h`
     at_rest,               ///< of a fault: nothing moves or will move again; the end is reached
     not_handed_over,       ///< a set-valued phase was due, with `HandOverOptions::events_only`
@@ -378,7 +378,8 @@ struct Run {
     /// guard of the cycle that accumulates.
     std::size_t guard = no_guard;
     std::size_t other_guard = no_guard;
-    std::string reason;                     ///< text of the `Stop` that ended the run
+    /// Text of the `Stop` that ended the run; of `non_finite` the function that was not finite.
+    std::string reason;
     std::vector<std::size_t> armed_beyond;  ///< guards that `Statistics::armed_beyond` counts
     std::vector<Event<State>> events;
     Trajectory<State> trajectory;  ///< empty unless `Options::sample_times` were given
@@ -389,6 +390,7 @@ struct Run {
 
 namespace detail {
 
+[[nodiscard]] std::string describe_reason(Outcome outcome, const std::string& reason);
 [[nodiscard]] std::string describe_run(Outcome outcome, const std::string& reason,
                                        const std::vector<std::size_t>& armed_beyond);
 

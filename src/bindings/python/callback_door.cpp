@@ -126,9 +126,11 @@ public:
                 if (guard.directed) return at(door).reset_by_direction(guard, mode, t, x);
                 return at(door).edit(guard.reset, "reset of ", guard.owner, mode, t, x);
             };
-            table.tell_direction = [](void* door, Crossing direction) {
-                at(door).direction_ = direction;
-            };
+            if (any(&CallbackGuard::directed)) {
+                table.tell_direction = [](void* door, Crossing direction) {
+                    at(door).direction_ = direction;
+                };
+            }
         }
         if (any(&CallbackGuard::rest)) {
             table.rest = [](void* door, std::size_t which, Mode mode, double t, State& x) {

@@ -291,7 +291,7 @@ void bind_results(py::module_& module)
             [](const PyRun& self) {
                 std::string out(describe(self.record.outcome));
                 if (!self.record.reason.empty()) {
-                    out = "a reset ended the run: " + self.record.reason;
+                    out = detail::describe_reason(self.record.outcome, self.record.reason);
                 }
                 const bool conflicts = self.record.outcome == Outcome::conflicting_resets;
                 if (conflicts) {
@@ -324,7 +324,9 @@ void bind_results(py::module_& module)
             "resets that declined.")
         .def_property_readonly(
             "reason", [](const PyRun& self) { return self.record.reason; },
-            "The text of the `Stop` that ended the run, or an empty one.")
+            "The text of the `Stop` that ended the run, the function that was not finite, or an "
+            "empty "
+            "text.")
         .def_property_readonly(
             "success",
             [](const PyRun& self) {
