@@ -215,9 +215,8 @@ bool EventEngine<X, single>::acts_beyond()
     const auto fired = search_.fired().span();
     for (const std::size_t i : fired) count += bank_[i].info.resets;
     const std::size_t i = fired[0];
-    if (!system_->moded || !system_->reset || fired.size() > 1 || !bank_[i].info.resets) {
-        return false;
-    }
+    const bool asks = system_->moded && system_->reset && !system_->after_set;
+    if (!asks || fired.size() > 1 || !bank_[i].info.resets) return false;
     X& x = resets_.scratch();
     if (kept_.uses_space) search_.put_space_back();
     const double t = search_.go_beyond(step_, bank_, i, x, calls());
