@@ -14,7 +14,7 @@ FUNCTIONS = """flow guard guards guard_rate guard_rates guard_curvature guard_in
 VALUES = "guard_count mode_count crossing unilateral changes_dimension forward_only".split()
 WHAT = "a system"
 if sys.argv[1:] == ["inclusion"]:
-    FUNCTIONS = """smooth_jacobian mass observe act offset offset_rate branch_bound
+    FUNCTIONS = """smooth_jacobian mass observe act offset offset_rate branch_bound static_bound
         bound_gradient""".split()
     VALUES = "confines affine".split()
     WHAT = "an inclusion"

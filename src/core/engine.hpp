@@ -604,6 +604,10 @@ protected:
     /// Another guard of the cycle in which guard i accumulates: the last one before it.
     [[nodiscard]] std::size_t other_of_cycle(std::size_t i);
 
+    /// The guard whose rest is asked where events of guard i accumulate: i, else the other one of
+    /// its cycle, else `no_guard`.
+    [[nodiscard]] std::size_t resting_of_cycle(std::size_t i);
+
     /// Stores the rate at which guard i leaves its surface after its reset. True if the guard will
     /// not rise above its rounding any more.
     [[nodiscard]] bool fades(std::size_t i);

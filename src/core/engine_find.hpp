@@ -236,9 +236,8 @@ bool EventEngine<X, single>::acts_beyond()
     };
     for (const std::size_t i : fired) count += is_meant(i);
     const std::size_t i = fired[0];
-    if (!system_->moded || !system_->reset || fired.size() > 1 || !bank_[i].info.resets) {
-        return false;
-    }
+    const bool asks = system_->moded && system_->reset && !system_->after_set;
+    if (!asks || fired.size() > 1 || !bank_[i].info.resets) return false;
     X& x = resets_.scratch();
     if (kept_.uses_space) search_.put_space_back();
     const double t = search_.go_beyond(step_, bank_, i, x, calls());

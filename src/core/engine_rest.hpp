@@ -195,6 +195,17 @@ std::size_t EventEngine<X, single>::other_of_cycle(std::size_t i)
 }
 
 template <class X, bool single>
+inline std::size_t EventEngine<X, single>::resting_of_cycle(std::size_t i)
+{
+    if (!system_->rest) return no_guard;
+    if (!system_->rests) return i;
+    const std::size_t other = other_of_cycle(i);
+    if (system_->rests(system_.door(), i, other)) return i;
+    const bool rests = other != no_guard && system_->rests(system_.door(), other, i);
+    return rests ? other : no_guard;
+}
+
+template <class X, bool single>
 double EventEngine<X, single>::error_by_rounding(double round)
 {
     double error = 0;
@@ -216,12 +227,14 @@ inline double EventEngine<X, single>::distance_put_back(std::size_t i)
 template <class X, bool single>
 inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, double error)
 {
-    if (!system_->rest || is_of_phases(i) || bank_[i].intervals.outlast_rest()) {
+    const std::size_t resting = resting_of_cycle(i);
+    if (resting == no_guard || is_of_phases(i) || bank_[i].intervals.outlast_rest()) {
         end(Outcome::zeno, i);
         run_.other_guard = other_of_cycle(i);
         return;
     }
     if (ended_) return;
+    if (resting != i) bank_[std::exchange(i, resting)].intervals.come_to_rest();
     const X before = step_.x0();
     const Mode mode = step_.mode();
     ahead = std::min(ahead, step_.until(options_.t_end));

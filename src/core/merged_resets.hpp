@@ -45,54 +45,18 @@ public:
     explicit MergedResets(const X& like) : after_(like), single_(like), along_(like) {}
 
     /// Applies the resets of the guards that fired to the state `before`, and the reset of a time
-    /// event. `bank` knows which guards have a reset.
+    /// event, and then lets the system decide its mode, if it does. `bank` knows which guards have
+    /// a reset.
     /// @param stands  whether guard i still has its event in a mode and a state, and in which
     ///                direction it has crossed
     template <class Bank, class Stands>
     void apply(const SystemAt<X>& system, const Bank& bank, const FiredSet& set, const X& before,
                const Stands& stands)
     {
-        const std::span<const std::size_t> fired = set.fired;
-        const bool on_time = set.on_time;
-        const Mode mode = set.mode;
-        const double t = set.t;
-        assign(after_, before);
-        mode_ = mode;
-        conflict_ = {no_guard, no_guard};
-        stops_ = false;
-        if (fired.size() == 1 && !on_time && !system->reset_set) {
-            const std::size_t i = fired[0];
-            if (!system->reset || !bank[i].info.resets) return;
-            tell_direction(system, stands.direction(i));
-            mode_ = ask(i, mode, [&] { return system->reset(system.door(), i, mode, t, after_); });
-            return;
-        }
-        const auto resets = [&](std::size_t i) { return system->resets() && bank[i].info.resets; };
-        if (system->reset_set && std::any_of(fired.begin(), fired.end(), resets)) {
-            const FiredGuards set(fired, on_time);
-            mode_ = ask(fired[0], mode,
-                        [&] { return system->reset_set(system.door(), set, mode, t, after_); });
-            return;
-        }
-        members_ = {};
-        for (const std::size_t i : fired) {
-            if (resets(i)) add_member(i);
-        }
-        if (on_time && system->time_reset) add_member(time_event_reset);
-        const auto reset = [&](const Member& member, Mode in, X& x) {
-            if (member.who != time_event_reset)
-                tell_direction(system, stands.direction(member.who));
-            return ask(member.who, in, [&] {
-                return member.who == time_event_reset
-                           ? system->time_reset(system.door(), in, t, x)
-                           : system->reset(system.door(), member.who, in, t, x);
-            });
-        };
-        if (members_.size() == 1) {
-            mode_ = reset(members_[0], mode, after_);
-        } else if (!members_.empty()) {
-            apply_together(before, mode, reset, stands);
-        }
+        apply_resets(system, bank, set, before, stands);
+        if (!system->after_set || conflict_.first != no_guard) return;
+        mode_ = system->after_set(system.door(), FiredGuards(set.fired, set.on_time), set.mode,
+                                  set.t, before, after_);
     }
 
     /// Applies the reset of guard i, which has left the state `before`, to the state x. Components
@@ -138,6 +102,53 @@ public:
     [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
 
 private:
+    template <class Bank, class Stands>
+    void apply_resets(const SystemAt<X>& system, const Bank& bank, const FiredSet& set,
+                      const X& before, const Stands& stands)
+    {
+        const std::span<const std::size_t> fired = set.fired;
+        const bool on_time = set.on_time;
+        const Mode mode = set.mode;
+        const double t = set.t;
+        assign(after_, before);
+        mode_ = mode;
+        conflict_ = {no_guard, no_guard};
+        stops_ = false;
+        if (fired.size() == 1 && !on_time && !system->reset_set) {
+            const std::size_t i = fired[0];
+            if (!system->reset || !bank[i].info.resets) return;
+            tell_direction(system, stands.direction(i));
+            mode_ = ask(i, mode, [&] { return system->reset(system.door(), i, mode, t, after_); });
+            return;
+        }
+        const auto resets = [&](std::size_t i) { return system->resets() && bank[i].info.resets; };
+        if (system->reset_set && std::any_of(fired.begin(), fired.end(), resets)) {
+            const FiredGuards set(fired, on_time);
+            mode_ = ask(fired[0], mode,
+                        [&] { return system->reset_set(system.door(), set, mode, t, after_); });
+            return;
+        }
+        members_ = {};
+        for (const std::size_t i : fired) {
+            if (resets(i)) add_member(i);
+        }
+        if (on_time && system->time_reset) add_member(time_event_reset);
+        const auto reset = [&](const Member& member, Mode in, X& x) {
+            if (member.who != time_event_reset)
+                tell_direction(system, stands.direction(member.who));
+            return ask(member.who, in, [&] {
+                return member.who == time_event_reset
+                           ? system->time_reset(system.door(), in, t, x)
+                           : system->reset(system.door(), member.who, in, t, x);
+            });
+        };
+        if (members_.size() == 1) {
+            mode_ = reset(members_[0], mode, after_);
+        } else if (!members_.empty()) {
+            apply_together(before, mode, reset, stands);
+        }
+    }
+
     /// The mode after a reset. The first that ends the run is noted, unless resets are asked again
     /// in other orders.
     template <class Reset>

@@ -334,12 +334,41 @@ ContactReport ContactSolver::solve(const Eigen::MatrixXd& w, const Eigen::Vector
     return report;
 }
 
+/// Tries the four states of one contact with one tangent: open, sticking, slipping either way. With
+/// much friction W is far from monotone, and Newton's method may not find the one that is
+/// consistent. True: p_ is a solution.
+bool ContactSolver::enumerate(ContactReport& report)
+{
+    if (friction_.size() != 1 || components_ != 2) return false;
+    const auto& w = w_;
+    const auto& q = q_;
+    start_ = p_;
+    const auto fits = [&](double normal, double tangential) {
+        if (!std::isfinite(normal) || !std::isfinite(tangential)) return false;
+        p_[0] = normal, p_[1] = tangential;
+        defects(p_, f_);
+        report.residual = measure(p_, f_);
+        return report.residual <= options_.tolerance;
+    };
+    const double determinant = w(0, 0) * w(1, 1) - w(0, 1) * w(1, 0);
+    if (fits(0, 0) || fits((w(0, 1) * q[1] - w(1, 1) * q[0]) / determinant,
+                           (w(1, 0) * q[0] - w(0, 0) * q[1]) / determinant)) {
+        return true;
+    }
+    for (const double sign : {1.0, -1.0}) {
+        const double normal = -q[0] / (w(0, 0) - sign * friction_[0] * w(0, 1));
+        if (fits(normal, -sign * friction_[0] * normal)) return true;
+    }
+    p_ = start_;
+    return false;
+}
+
 void ContactSolver::iterate(Eigen::VectorXd& p, ContactReport& report)
 {
     p_ = p.cwiseQuotient(units_);
     // Without a velocity no impulse is needed, and there is no scale to measure defects by.
     if (!p_.allFinite() || q_.isZero(0)) p_.setZero();
-    bool solved = newton(report) || proximal(report);
+    bool solved = newton(report) || enumerate(report) || proximal(report);
     // Sweeps, with more of them each time between the attempts of Newton's method.
     for (int batch = 5; !solved && report.sweeps < options_.max_sweeps; batch = 2 * batch) {
         // Where full sweeps cycle, damped ones may converge.

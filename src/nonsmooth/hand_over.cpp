@@ -43,6 +43,7 @@ HandOverOptions hand_over_options(const Options& options)
     out.event_tolerance = options.event_tolerance;
     out.sample_times = options.sample_times;
     out.max_steps = std::min(options.max_steps, out.max_steps);
+    out.stall_steps = options.stall_steps;
     out.cancelled = options.cancelled;
     return out;
 }
@@ -63,7 +64,6 @@ HandOverOptions inclusion_options(const Options& options)
     unused(options.event_rtol != unset.event_rtol, "event_rtol");
     unused(options.event_window != unset.event_window, "event_window");
     unused(options.check_inside != unset.check_inside, "check_inside");
-    unused(options.stall_steps != unset.stall_steps, "stall_steps");
     return hand_over_options(options);
 }
 

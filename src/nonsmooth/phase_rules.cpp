@@ -165,6 +165,7 @@ Kind PhaseRules::enter(double t, double* x)
     changes_.clear();
     phases_.clear();
     bool clear = true;
+    inclusion_.check_bounds(t, x);
     inclusion_.observe(t, x, y_.data());
     for (std::size_t i = 0; i < count(); ++i) {
         clear = clear && (!watched_[i] || is_clear(i, y_[i], x));
@@ -200,6 +201,7 @@ Kind PhaseRules::go_by_steps(PhaseCause cause, double t, const double* x)
     memory_.steps = 0;
     cause_ = cause;
     Mode b = 0;
+    if (inclusion_.keeps_to_branches()) return end_with(Outcome::not_handed_over);
     if (!inclusion_.select(t, x, b)) return end_with(Outcome::not_converged);
     memory_.across = b;
     return chatters ? across() : implicit_in(b);

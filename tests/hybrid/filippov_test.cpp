@@ -225,8 +225,8 @@ TEST(Filippov, ATangentStartGoesItsWayWithoutAnEvent)
 TEST(Filippov, ModesAndGuardsHaveNames)
 {
     EXPECT_EQ(Filippov<Line>::mode_name(2), "sliding");
-    EXPECT_EQ(Filippov<Line>::guard_info(0).name, "surface 0 rising");
-    EXPECT_EQ(Filippov<Line>::guard_info(3).name, "exit 0 above");
+    EXPECT_EQ(Filippov<Line>().guard_info(0).name, "surface 0 rising");
+    EXPECT_EQ(Filippov<Line>().guard_info(3).name, "exit 0 above");
     EXPECT_EQ(Filippov<Line>::place(0, Filippov<Line>::mode_of(Place::above)), Place::above);
 }
 

@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <limits>
+#include <random>
+#include <vector>
 
 #include "random_contacts.hpp"
 #include "ricochet/detail/contact_problem.hpp"
@@ -33,6 +36,42 @@ TEST(ContactSolver, OneContactSeparatesSticksOrSlides)
     // Slides: p_n = 1, friction 0.5 against the direction (3, -4) / 5.
     EXPECT_LT((solve(-2, 3, -4) - Eigen::Vector3d(1, -0.3, 0.4)).norm(), 1e-10);
     EXPECT_LT(solve(0, 0, 0).norm(), 1e-300);
+}
+
+// The end of a thin rod (mass 1, length 2) on a floor: with much friction W is far from monotone.
+TEST(ContactSolver, ARodWithMuchFrictionHasTheStateThatItsCasesHave)
+{
+    ContactSolver solver;
+    std::mt19937 random(11);
+    std::uniform_real_distribution<double> any(-1, 1);
+    int unique = 0;
+    for (int k = 0; k < 4000; ++k) {
+        const double angle = 1.5 * any(random), friction = std::pow(10.0, 2 + any(random) * 2);
+        const double c = std::cos(angle), s = std::sin(angle), inverse_inertia = 3;
+        Eigen::Matrix2d w;
+        w << 1 + inverse_inertia * c * c, inverse_inertia * c * s, inverse_inertia * c * s,
+            1 + inverse_inertia * s * s;
+        const Eigen::Vector2d q(any(random), any(random));
+        // The consistent states, by their signs.
+        std::vector<Eigen::Vector2d> states;
+        if (q[0] >= 0) states.emplace_back(0, 0);
+        const Eigen::Vector2d sticks = -w.inverse() * q;
+        if (std::abs(sticks[1]) <= friction * sticks[0]) states.push_back(sticks);
+        for (const double sign : {1.0, -1.0}) {
+            const double normal = -q[0] / (w(0, 0) - sign * friction * w(0, 1));
+            const Eigen::Vector2d slips(normal, -sign * friction * normal);
+            if (normal > 0 && sign * (q[1] + w.row(1).dot(slips)) > 0) states.push_back(slips);
+        }
+        if (states.size() != 1) continue;
+        ++unique;
+        const std::vector<double> coefficient = {friction};
+        Eigen::VectorXd p = Eigen::VectorXd::Zero(2);
+        const ContactReport report = solver.solve(w, q, coefficient, 2, p);
+        ASSERT_TRUE(report.converged) << angle << ' ' << friction << ' ' << q.transpose();
+        EXPECT_LE((p - states[0]).norm(), 1e-8 * (1 + states[0].norm()))
+            << angle << ' ' << friction;
+    }
+    EXPECT_GT(unique, 2000);
 }
 
 TEST(ContactSolver, WithoutFrictionItIsALinearComplementarityProblem)

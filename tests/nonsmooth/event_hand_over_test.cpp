@@ -492,7 +492,6 @@ TEST(EventHandOver, RefusesOptionsThatARunOfAnInclusionAloneDoesNotUse)
     refused([](Options& o) { o.event_rtol = 1e-9; }, "event_rtol");
     refused([](Options& o) { o.event_window = 1e-9; }, "event_window");
     refused([](Options& o) { o.check_inside = false; }, "check_inside");
-    refused([](Options& o) { o.stall_steps = 10; }, "stall_steps");
 }
 
 }  // namespace

@@ -60,6 +60,7 @@ private:
         if constexpr (can_branch) {
             if (branching_) {
                 State& start = run_.state;
+                modes_.check_bounds(start.t, start.w);
                 const Mode mode = keeps_reaction_
                                       ? modes_.mode_after(start, 10 * resolution(start.w))
                                       : modes_.mode_at(start.t, start.w);
@@ -86,13 +87,16 @@ private:
         return run_.statistics.event_driven.steps + motion_.statistics().attempted;
     }
 
-    /// Whether a limited run cannot reach its end. A step whose guards are divided to the end costs
-    /// as much as hundreds, so 64 evaluations of a guard count as a step, too.
+    /// Whether the run hardly advances, or a limited one cannot reach its end. A step whose guards
+    /// are divided to the end costs as much as hundreds, so 64 evaluations of a guard count as a
+    /// step, too.
     [[nodiscard]] bool stands_still(double t, const Statistics& phase) noexcept
     {
+        const std::uint64_t steps = steps_taken() + phase.steps;
+        if (stall_(t, steps)) return true;
         if (options_.max_steps >= HandOverOptions{}.max_steps) return false;
         const std::uint64_t calls = run_.statistics.event_driven.guard_calls + phase.guard_calls;
-        const std::uint64_t effort = steps_taken() + phase.steps + calls / 64;
+        const std::uint64_t effort = steps + calls / 64;
         return pace_(t, effort, run_.events.size() + phase.events);
     }
 
@@ -150,7 +154,7 @@ private:
                 flutters = unresolved(events.size(), events.back().t, resolution(simulation->x()),
                                       [&] { return speed_after(events.back()); });
             }
-            if (!chatters && !flutters && !released && may_lengthen()) {
+            if (!chatters && !flutters && !released && may_lengthen(simulation->mode())) {
                 note_place(*simulation, before);
                 return go_back(simulation->finish(), before);
             }
@@ -239,9 +243,15 @@ private:
     }
 
     /// Whether enough consecutive steps were shorter than necessary for longer ones to be tried.
-    [[nodiscard]] bool may_lengthen() noexcept requires can_branch
+    /// The limit is that of the held reactions, and ends with them.
+    [[nodiscard]] bool may_lengthen(Mode mode) noexcept requires can_branch
     {
         if (std::isinf(longest_step_)) return false;
+        if (!Modes::holds(mode)) {
+            longest_step_ = std::numeric_limits<double>::infinity();
+            easy_steps_ = 0;
+            return true;
+        }
         easy_steps_ = held_.is_easy() ? easy_steps_ + 1 : 0;
         if (easy_steps_ < 8) return false;
         easy_steps_ = 0;
@@ -325,6 +335,7 @@ private:
                 ++idle;
             } else if (event.mode_after != Modes::empty) {
                 run_.events.push_back(converted(event));
+                if (keeps_to_branches_) record_other_slips(done, event);
             }
         }
         for (std::size_t i = 0; i < done.trajectory.t.size(); ++i) {
@@ -333,6 +344,27 @@ private:
         }
         add(run_.statistics.event_driven, done.statistics);
         run_.statistics.event_driven.events -= idle;
+    }
+
+    /// Reactions that slip at an event of another one, in whose set they have none of their own.
+    template <class X>
+    void record_other_slips(const Run<X>& done, const Event<X>& event) requires can_branch
+    {
+        if (event.mode_after >= Modes::branch_modes) return;
+        const auto is_of = [&](const Event<X>& other, std::size_t i) {
+            return other.t == event.t && other.guard / 4 == i &&
+                   other.mode_before == event.mode_before && other.mode_after == event.mode_after;
+        };
+        for (std::size_t i = 0; i < static_cast<std::size_t>(modes_.count()); ++i) {
+            if (Modes::branch(i, event.mode_before) != Branch::inside) continue;
+            if (Modes::branch(i, event.mode_after) == Branch::inside) continue;
+            const auto has_own = [&](const Event<X>& other) { return is_of(other, i); };
+            if (std::any_of(done.events.begin(), done.events.end(), has_own)) continue;
+            Event<Vector> slip = converted(event);
+            slip.guard = slip.reaction = i;
+            slip.kind = EventKind::slip;
+            run_.events.push_back(std::move(slip));
+        }
     }
 
     void end_with_empty_set() requires can_branch
@@ -384,7 +416,7 @@ private:
                 chatter_patience_ = std::min(2 * chatter_patience_, most_patience);
             }
         }
-        if (options_.events_only) return end_with(Outcome::not_handed_over);
+        if (options_.events_only || keeps_to_branches_) return end_with(Outcome::not_handed_over);
         set_valued_ = true;
         ++run_.statistics.to_set_valued;
         run_.phases.push_back({.from = run_.state.t, .set_valued = true, .cause = cause});
@@ -551,11 +583,13 @@ private:
     HandOverOptions options_;
     EventStepping<N, M> stepping_;
     bool branching_;
+    bool keeps_to_branches_;  ///< set-valued steps know of no static bounds
     Modes modes_;
     AnyMotion<N, M> motion_;
     State sample_;
     AnyHandOverRun<N, M> run_;
     PaceWatch pace_{options_.t_start, options_.t_end, options_.max_steps};
+    StallWatch stall_{options_.t_start, options_.t_end, options_.stall_steps};
     static constexpr std::uint64_t most_patience = std::uint64_t{1} << 20;
     [[no_unique_address]] Held held_;
     double longest_step_ = std::numeric_limits<double>::infinity();  // of the event-driven kind
@@ -574,6 +608,7 @@ AnyHandOver<N, M>::AnyHandOver(const AnyInclusion<N, M>& inclusion, const Vector
     : options_(completed(options, branches(inclusion.traits()))),
       stepping_(stepping),
       branching_(branches(inclusion.traits())),
+      keeps_to_branches_(inclusion.traits().gives_static_bound),
       modes_(inclusion),
       motion_(inclusion, w0, options_.set_valued),
       sample_(motion_.state())

@@ -45,6 +45,7 @@ struct InclusionTraits {
     bool moves = false;           ///< has `offset`, or padded reactions
     bool gives_offset_rate = false;
     bool continues_bounds = false;  ///< has `branch_bound`
+    bool gives_static_bound = false;
     bool gives_bound_gradient = false;
 
     [[nodiscard]] bool of_reactions() const noexcept { return confines == Confines::reaction; }
@@ -93,6 +94,7 @@ struct RICOCHET_ALIGNED InclusionTable {
 
     /// A bound that is smooth beyond y = 0 where the system gives such an extension.
     double (*bound)(System, double t, const State& w, Eigen::Index i, Branch side) = nullptr;
+    double (*static_bound)(System, double t, const State& w, Eigen::Index i) = nullptr;
     void (*bound_gradient)(System, double t, const State& w, Eigen::Index i, State& g) = nullptr;
 
     // Functions of the modes of branches (branch_terms.hpp). Each is one call, so that nothing goes
@@ -199,6 +201,11 @@ public:
             lower[i] = bound(t, w, i, Branch::lower);
             upper[i] = bound(t, w, i, Branch::upper);
         }
+    }
+    /// The largest |reaction i| that holds y_i; only where the system gives one.
+    [[nodiscard]] double static_bound(double t, const State& w, Eigen::Index i) const
+    {
+        return table_->static_bound(system(), t, w, i);
     }
     void bound_gradient(double t, const State& w, Eigen::Index i, State& g) const
     {

@@ -16,7 +16,7 @@ template <int N, int M>
 void AnyModes<N, M>::rooms(Mode mode, double t, const Vector& w, Motion& motion, Rooms& rooms) const
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    matrices_.inclusion().branch_state(terms_, mode, t, w, motion);
+    find_motion(mode, t, w, motion);
     const Reaction &r = motion.reaction, &lower = motion.lower, &upper = motion.upper;
     rooms.fill(infinity);
     Mode rest = mode;
@@ -109,6 +109,14 @@ Mode AnyModes<N, M>::reset(const FiredGuards& fired, Mode mode, double t, State&
     int arrived = 0;
     Branches held = branches;
     Vector w = vector(x);
+    if (matrices_.traits().gives_static_bound && is_static(branches)) {
+        for (const std::size_t which : fired) {
+            if (which >= first_set_guard) return empty;
+        }
+        const Mode next = reset_static(fired, branches, t, w);
+        Eigen::Map<Vector>(x.data()) = w;
+        return next;
+    }
     // Reactions at a bound whose y is zero too, as for contacts that depend on one another.
     const Branches zero = zero_branches(t, w);
     int undecided = 0;

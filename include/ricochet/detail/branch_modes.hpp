@@ -52,6 +52,8 @@ namespace detail {
 /// of `reaction_set` is not, as with F(|y|), the system declares
 ///
 ///     double branch_bound(t, w, i, branch) const
+///
+/// Held reactions have the bounds of `static_bound`, where the system declares it.
 template <int N, int M>
 class RICOCHET_ALIGNED AnyModes {
 public:
@@ -221,6 +223,9 @@ public:
         return terms_.observed(i, v);
     }
 
+    /// @throws std::invalid_argument where a bound jumps at y = 0, from (t, w) onto it.
+    void check_bounds(double t, const Vector& w) const;
+
     /// The first reaction whose bounds form no interval; -1 if all do.
     [[nodiscard]] int faulty(double t, const Vector& w) const
     {
@@ -304,9 +309,50 @@ private:
     [[nodiscard]] Motion motion(Mode mode, double t, const Vector& w) const
     {
         Motion out;
-        matrices_.inclusion().branch_state(terms_, mode, t, w, out);
+        find_motion(mode, t, w, out);
         return out;
     }
+    void find_motion(Mode mode, double t, const Vector& w, Motion& out) const
+    {
+        matrices_.inclusion().branch_state(terms_, mode, t, w, out);
+        if (!matrices_.traits().gives_static_bound) return;
+        for (Eigen::Index i = 0; i < count(); ++i) {
+            if (!is_held(i, mode)) continue;
+            out.upper[i] = matrices_.inclusion().static_bound(t, w, i);
+            out.lower[i] = -out.upper[i];
+        }
+    }
+
+    // --- static bounds, see static_bounds.hpp ---
+
+    /// What acts on reactions whose y is zero.
+    struct Loads {
+        Reaction rate;          ///< y' without reactions
+        Reaction lower, upper;  ///< kinetic bounds
+        Reaction most;          ///< static bounds
+
+        [[nodiscard]] double kinetic(Eigen::Index i, Branch side) const
+        {
+            return side == Branch::lower ? lower[i] : upper[i];
+        }
+    };
+    /// @throws std::invalid_argument for a static bound below the kinetic one.
+    [[nodiscard]] Loads static_loads(double t, const Vector& w) const;
+    /// The reactions where those not inside are `known`, and y' is `rate` without reactions.
+    [[nodiscard]] Reaction held_by(const Branches& at, const Reaction& known,
+                                   const Reaction& rate) const;
+    /// Whether the room of held reaction i below its upper, or above its lower bound will fall from
+    /// here: the first of its first two derivatives that is not rounding is negative.
+    [[nodiscard]] bool room_falls(Eigen::Index i, bool upper, Mode mode, double t,
+                                  const Vector& w) const;
+    /// As `settle`; bit i of `fired`: held reaction i has met its static bound.
+    [[nodiscard]] Mode settle_static(Branches at, std::size_t fired, double t,
+                                     const Vector& w) const;
+    /// Whether every reaction that was inside before and is not after moves to its side.
+    [[nodiscard]] bool leads(const Branches& before, const Branches& after, const Reaction& r,
+                             const Reaction& rate) const;
+    [[nodiscard]] Mode reset_static(const FiredGuards& fired, Branches branches, double t,
+                                    Vector& w) const;
 
     /// How far a reaction is above its lower bound and below its upper one; for an infinite bound 1
     /// if the reaction is inside it, else -1.
@@ -390,6 +436,7 @@ private:
     {
         const Mode mode = mode_of(at);
         if (mask_of(mode) == 0) return mode;
+        if (is_static(at)) return settle_static(at, 0, t, w);
         Vector f;
         matrices_.smooth(t, w, f);
         LinearInequality<M> inequality;
@@ -431,6 +478,16 @@ private:
         const bool up = r[which] - inequality.lower[which] > inequality.upper[which] - r[which];
         next[which] = up ? Branch::upper : Branch::lower;
         return bend(next, which, size, t, w);
+    }
+
+    /// Whether static bounds hold the reactions inside, each of which acts on its y.
+    [[nodiscard]] bool is_static(const Branches& at) const
+    {
+        if (!matrices_.traits().gives_static_bound) return false;
+        for (Eigen::Index i = 0; i < count(); ++i) {
+            if (at[i] == Branch::inside && terms_.delassus(i, i) == 0) return false;
+        }
+        return true;
     }
 
     /// The mode when reaction i is at its bound in `next` and y_i does not move: y_i leaves zero if
@@ -564,3 +621,4 @@ public:
 }  // namespace ricochet
 
 #include "ricochet/detail/branch_guards.hpp"
+#include "ricochet/detail/static_bounds.hpp"

@@ -85,6 +85,10 @@ public:
 
     // --- entering ---
 
+    /// See `AnyModes::check_bounds`.
+    virtual void check_bounds(double t, const double* x) const = 0;
+    /// Whether only branches are followed: implicit steps know of no static bounds.
+    [[nodiscard]] virtual bool keeps_to_branches() const noexcept = 0;
     /// The signs of y as a branch mode: inside where y is zero up to rounding.
     [[nodiscard]] virtual Mode signs(double t, const double* x) const = 0;
     /// See `AnyModes::mode_at`. @throws InclusionRefused

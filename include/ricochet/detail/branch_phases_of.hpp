@@ -118,6 +118,14 @@ public:
 
     // --- entering ---
 
+    void check_bounds(double t, const double* x) const override
+    {
+        modes_.check_bounds(t, vector(x));
+    }
+    [[nodiscard]] bool keeps_to_branches() const noexcept override
+    {
+        return matrices().traits().gives_static_bound;
+    }
     [[nodiscard]] Mode signs(double t, const double* x) const override
     {
         return Modes::mode_of(modes_.zero_branches(t, vector(x)));

@@ -83,6 +83,7 @@ private:
     [[nodiscard]] bool proximal(ContactReport& report);
     void polish();
     void iterate(Eigen::VectorXd& p, ContactReport& report);
+    [[nodiscard]] bool enumerate(ContactReport& report);
     void jacobian(const Eigen::VectorXd& p);
     void sweep(double relaxation);
     void solve_contact(Eigen::Index c, double relaxation);

@@ -62,7 +62,7 @@ struct Names {
         unilateral;
     // The names of inclusions, see inclusion_declarations.hpp.
     int smooth, smooth_jacobian, mass, observe, act, offset, offset_rate, branch_bound,
-        bound_gradient;
+        static_bound, bound_gradient;
     int confines, affine;
 };
 
@@ -163,6 +163,7 @@ RICOCHET_NAME(act)
 RICOCHET_NAME(offset)
 RICOCHET_NAME(offset_rate)
 RICOCHET_NAME(branch_bound)
+RICOCHET_NAME(static_bound)
 RICOCHET_NAME(bound_gradient)
 RICOCHET_NAME(confines)
 RICOCHET_NAME(affine)

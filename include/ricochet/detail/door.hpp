@@ -236,6 +236,13 @@ class TableOf {
         return at(door).edit(
             x, [&](X& state) { return call_reset_set(system(door), fired, mode, t, state); });
     }
+    static Mode after_set(void* door, const FiredGuards& fired, Mode mode, double t,
+                          const C& before, C& x)
+    {
+        const X& was = at(door).read(before, 0);
+        return at(door).edit(
+            x, [&](X& state) { return system(door).after_set(fired, mode, t, was, state); });
+    }
     static Mode rest(void* door, std::size_t which, Mode mode, double t, C& x)
     {
         return at(door).edit(
@@ -292,7 +299,13 @@ class TableOf {
                 };
             }
         }
+        if constexpr (DecidesAfterSets<System, X>) table.after_set = &after_set;
         if constexpr (Resting<System, X>) table.rest = &rest;
+        if constexpr (Resting<System, X> && RestsAtSome<System>) {
+            table.rests = [](void* door, std::size_t which, std::size_t other) -> bool {
+                return system(door).rests(which, other);
+            };
+        }
     }
 
     static constexpr void add_times(SystemTable<C>& table)

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "ricochet/detail/components.hpp"
+#include "ricochet/detail/filippov_events.hpp"
 #include "ricochet/detail/filippov_rates.hpp"
 #include "ricochet/detail/scratch.hpp"
 #include "ricochet/hybrid/guard.hpp"
@@ -115,7 +116,7 @@ public:
         check_restoring_rate(options_.restoring_rate);
     }
 
-    [[nodiscard]] const Fields& fields() const noexcept { return fields_; }
+    [[nodiscard]] const OwnEvents<Fields>& fields() const noexcept { return fields_; }
 
     // --- places ---
 
@@ -183,6 +184,24 @@ public:
             move(moved[0], x, -delta, v);
             return (ahead - fields_.surface(which, t - delta, moved[0])) / (2 * delta);
         }
+    }
+
+    /// Rounding of h at x, where the components had the values of `before` as well: 64 units of the
+    /// terms |dh/dx_c| |x_c|, and of that of the time.
+    template <class X>
+    [[nodiscard]] double rounding(std::size_t which, double t, const X& before, const X& x) const
+    {
+        Scratch<X, 1> along(x);
+        for_each_component(x, [&](auto i) { along[0][i] = 0; });
+        const bool known = before.size() == x.size();
+        double terms = std::fabs(t) * std::fabs(slope(which, t, x, along[0], 1));
+        for_each_component(x, [&](auto i) {
+            along[0][i] = 1;
+            const double size = greatest_of(std::fabs(x[i]), known ? std::fabs(before[i]) : 0.0);
+            if (size > 0) terms += size * std::fabs(slope(which, t, x, along[0], 0));
+            along[0][i] = 0;
+        });
+        return 64 * std::numeric_limits<double>::epsilon() * terms;
     }
 
     /// Same as `surface_rate`, but 0 where that is within the rounding of its terms, the rates for
@@ -345,6 +364,27 @@ public:
     }
 
 private:
+    /// Derivative of h along (dt, direction).
+    template <class X>
+    [[nodiscard]] double slope(std::size_t which, double t, const X& x, const X& direction,
+                               double dt) const
+    {
+        if constexpr (RatedSurfaces<Fields, X>) {
+            Scratch<X, 1> none(x);
+            for_each_component(x, [&](auto i) { none[0][i] = 0; });
+            const double in_time = fields_.surface_rate(which, t, x, none[0]);
+            return fields_.surface_rate(which, t, x, direction) - (1 - dt) * in_time;
+        } else {
+            const double delta = 6e-6 * greatest_of(greatest_of(1.0, largest_component(x)),
+                                                    dt != 0 ? std::fabs(t) : 0.0);
+            Scratch<X, 1> moved(x);
+            move(moved[0], x, delta, direction);
+            const double ahead = fields_.surface(which, t + dt * delta, moved[0]);
+            move(moved[0], x, -delta, direction);
+            return (ahead - fields_.surface(which, t - dt * delta, moved[0])) / (2 * delta);
+        }
+    }
+
     /// x' = f_below - (r_below + c h) (f_above - f_below) / (r_above - r_below). Where the
     /// surface is one component of the state, minus a constant, the quotient is 1 and the
     /// component's rate exactly 0.
@@ -462,7 +502,7 @@ private:
         return largest_component(jump) > 0x1p-6 * largest_component(rates);
     }
 
-    Fields fields_;
+    OwnEvents<Fields> fields_;
     FilippovOptions options_;
 };
 

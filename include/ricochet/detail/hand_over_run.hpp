@@ -64,6 +64,9 @@ struct HandOverOptions {
 
     std::vector<double> sample_times{};     ///< ascending
     std::uint64_t max_steps = 100'000'000;  ///< of both kinds, including attempts
+    /// The run ends as `stalled` if this many steps, of both kinds, advance it by less than 1e-9 of
+    /// its span; 0: never.
+    std::uint64_t stall_steps = 1'000'000;
     const std::atomic<bool>* cancelled = nullptr;
 };
 

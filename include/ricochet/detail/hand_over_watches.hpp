@@ -56,6 +56,30 @@ private:
     double t_ = 0;
 };
 
+/// Whether a number of steps in a row advances a run by less than 1e-9 of its span.
+class StallWatch {
+public:
+    /// @param most  that number; 0: never
+    StallWatch(double t, double t_end, std::uint64_t most) noexcept
+        : t_(t), least_(1e-9 * (t_end - t)), most_(most), due_(most)
+    {
+    }
+
+    /// Called at time t, after that many steps.
+    [[nodiscard]] bool operator()(double t, std::uint64_t steps) noexcept
+    {
+        if (most_ == 0 || steps < due_) return false;
+        const bool stalls = t - t_ < least_;
+        due_ = steps + most_;
+        t_ = t;
+        return stalls;
+    }
+
+private:
+    double t_, least_;
+    std::uint64_t most_, due_;
+};
+
 /// Whether a run advances so little, over the effort of 20 000 steps without an event, that not
 /// even a hundred times the effort it may make would reach its end, and far less than so far.
 class PaceWatch {

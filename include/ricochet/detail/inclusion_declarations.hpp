@@ -109,6 +109,16 @@ template <class System>
     return found == Declaration::fits && !returns ? Declaration::does_not_fit : found;
 }
 
+template <class System>
+[[nodiscard]] constexpr Declaration static_bound_declaration() noexcept
+{
+    using W = const StateOf<System>&;
+    constexpr Declaration found =
+        member_declaration<Name_static_bound, System, false, double, W, int>();
+    return found == Declaration::fits && !HasStaticBound<System> ? Declaration::does_not_fit
+                                                                 : found;
+}
+
 /// Refuses what does not fit, with a sentence for each. Returns true, so that a static_assert
 /// makes the compiler evaluate this check before any other.
 template <class System>
@@ -184,6 +194,8 @@ constexpr bool check_inclusion()
         branch_bound,
         "double branch_bound(double t, const State& w, int i, ricochet::Branch branch) const",
         branch_bound_declaration<System>())
+    RICOCHET_CHECK(static_bound, "double static_bound(double t, const State& w, int i) const",
+                   static_bound_declaration<System>())
     RICOCHET_CHECK_WRITER(
         bound_gradient,
         "void bound_gradient(double t, const State& w, int i, State& gradient) const", double,

@@ -129,13 +129,26 @@ template <class System, class X, class... Which>
     }
 }
 
-/// A system whose resets at guards only put the state where it is but for rounding and drift. They
-/// are not differentiated: between the neighbouring points they may decide otherwise.
+/// A system in which the resets of some guards, those for which `settles(which)` holds, put the
+/// state where it is but for rounding and drift. They are not differentiated.
 template <class System>
 concept ResetsSettle = requires
 {
-    requires System::resets_settle;
+    {
+        System::settles(std::size_t{})
+        } -> std::same_as<bool>;
 };
+
+/// Whether the reset of a guard is one of those.
+template <class System>
+[[nodiscard]] constexpr bool reset_settles([[maybe_unused]] std::size_t which) noexcept
+{
+    if constexpr (ResetsSettle<System>) {
+        return System::settles(which);
+    } else {
+        return false;
+    }
+}
 
 // --- the kinds of reset, with a common interface ---
 
@@ -146,9 +159,9 @@ struct ResetOf {
     [[nodiscard]] FiredGuards all() const noexcept { return FiredGuards(std::span(&which, 1)); }
 
     template <class System>
-    [[nodiscard]] static constexpr bool settles() noexcept
+    [[nodiscard]] constexpr bool settles() const noexcept
     {
-        return ResetsSettle<System>;
+        return reset_settles<System>(which);
     }
 
     template <class System, class X>
@@ -192,7 +205,7 @@ struct ResetSet {
     template <class System>
     [[nodiscard]] bool settles() const noexcept
     {
-        return ResetsSettle<System> && !fired.time_event();
+        return !fired.time_event() && std::ranges::all_of(fired, &reset_settles<System>);
     }
 
     template <class System, class X>
@@ -324,6 +337,35 @@ struct TimeReset {
         return false;
     }
 };
+
+/// The guards that fired, and whether a time event did.
+[[nodiscard]] inline FiredGuards fired_in(const ResetOf& reset) noexcept
+{
+    return reset.all();
+}
+[[nodiscard]] inline FiredGuards fired_in(const ResetSet& reset) noexcept
+{
+    return reset.all();
+}
+[[nodiscard]] inline FiredGuards fired_in(const TimeReset&) noexcept
+{
+    return FiredGuards({}, true);
+}
+
+/// Applies a reset, and lets a system decide its mode that does so after sets. Derivatives are
+/// those of the reset alone: between neighbouring points the decision may differ, and it moves the
+/// state by rounding.
+template <class Reset, class System, class X>
+[[nodiscard]] Mode apply_set(const Reset& reset, const System& system, Mode mode, double t, X& x)
+{
+    if constexpr (DecidesAfterSets<System, X> && !std::is_same_v<Reset, RestOf>) {
+        const X before = x;
+        (void)reset.apply(system, mode, t, x);
+        return system.after_set(fired_in(reset), mode, t, before, x);
+    } else {
+        return reset.apply(system, mode, t, x);
+    }
+}
 
 /// Flow, guards and resets of a system, and their derivatives along directions (f_x s)
 /// and by its parameters (f_p), the latter by differences unless the parameter has them. The fields

@@ -47,6 +47,8 @@ template <int n, int m, int N, int M>
             event.bracket = from.bracket;
             event.slope = from.slope;
             event.error = from.error;
+            event.late = from.late;
+            event.reaction = from.reaction;
         }
         out.phases = std::move(run.phases);
         out.trajectory.t = std::move(run.trajectory.t);

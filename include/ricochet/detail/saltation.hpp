@@ -152,7 +152,7 @@ public:
     {
         const Motion<X> before = motion;
         const X f_before = linearization_.flow(before.mode, before.t, before.x);
-        motion.mode = reset.apply(system(), before.mode, before.t, motion.x);
+        motion.mode = apply_set(reset, system(), before.mode, before.t, motion.x);
         X f_after = linearization_.flow(motion.mode, motion.t, motion.x);
         std::size_t c = 0;
         for_each_component(f_after, [&](auto i) {

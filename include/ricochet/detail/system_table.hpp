@@ -87,7 +87,12 @@ struct SystemTable {
     /// not ask for it.
     void (*tell_direction)(Door, Crossing) = nullptr;
     Mode (*reset_set)(Door, const FiredGuards&, Mode, double t, X& x) = nullptr;
+    /// Called after all resets of a set, with the mode before them; gives the mode after the set.
+    Mode (*after_set)(Door, const FiredGuards&, Mode, double t, const X& before, X& x) = nullptr;
     Mode (*rest)(Door, std::size_t which, Mode, double t, X& x) = nullptr;
+    /// Whether `rest` has an answer for a guard whose events accumulate together with those of
+    /// another one, or of `no_guard`. Null: always.
+    bool (*rests)(Door, std::size_t which, std::size_t other) = nullptr;
 
     double (*next_time_event)(Door, double t) = nullptr;
     double (*previous_time_event)(Door, double t) = nullptr;

@@ -74,6 +74,9 @@ class TypedInclusion {
         s.bound_gradient(0.0, w, i, g);
     };
     static constexpr bool branching = has_modes<n, m> && (box || continues_bounds);
+    static_assert(!HasStaticBound<System> || (has_modes<n, m> && box && of_reactions),
+                  "ricochet: found static_bound in an inclusion without branches; expected a box "
+                  "of one to four reactions in a system of fixed size");
     static constexpr bool declares_inputs = DeclaresStepInputs<System, OwnState, OwnReaction>;
     /// Padded reactions of a box have the offset -1.
     static constexpr bool pads_offset = m != M && box && of_reactions;
@@ -386,6 +389,7 @@ public:
         traits.moves = moves || pads_offset;
         traits.gives_offset_rate = gives_offset_rate || (pads_offset && !moves);
         traits.continues_bounds = continues_bounds;
+        traits.gives_static_bound = HasStaticBound<System>;
         traits.gives_bound_gradient = gives_bound_gradient;
 
         out.smooth = smooth;
@@ -440,6 +444,11 @@ public:
             return static_cast<std::size_t>(at(s).reaction_set(t, state(w)).dimension());
         };
         if constexpr (box || continues_bounds) out.bound = bound;
+        if constexpr (HasStaticBound<System>) {
+            out.static_bound = [](S s, double t, const State& w, Eigen::Index i) -> double {
+                return i < m ? at(s).static_bound(t, state(w), static_cast<int>(i)) : 0;
+            };
+        }
         if constexpr (gives_bound_gradient) {
             out.bound_gradient = [](S s, double t, const State& w, Eigen::Index i, State& g) {
                 write<OwnState>(g, [&](auto& part) {

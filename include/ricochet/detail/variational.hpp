@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "ricochet/detail/directions.hpp"
+#include "ricochet/detail/guard_count.hpp"
 #include "ricochet/detail/linearization.hpp"
 #include "ricochet/detail/refusals.hpp"
 #include "ricochet/detail/saltation.hpp"
@@ -30,26 +31,6 @@
 #include "ricochet/integrate/options.hpp"
 
 namespace ricochet {
-
-namespace detail {
-
-/// `guard_count` as the system declares it: not at all, a constant, or a number.
-template <std::size_t fixed>
-struct GuardCount {
-    explicit GuardCount(std::size_t) noexcept {}
-    static constexpr std::size_t guard_count = fixed;
-};
-template <>
-struct GuardCount<0> {
-    explicit GuardCount(std::size_t) noexcept {}
-};
-template <>
-struct GuardCount<counted_at_run_time> {
-    explicit GuardCount(std::size_t count) noexcept : guard_count(count) {}
-    std::size_t guard_count;
-};
-
-}  // namespace detail
 
 /// The variational system of `System` on states X, in `columns()` directions.
 ///
@@ -243,11 +224,9 @@ public:
         const X before = head(y);
         X after = before;
         detail::Conflict conflict;
-        Mode next = mode;
-        if constexpr (detail::ResetsTogether<System, X>) {
-            next = detail::call_reset_set(system(), fired, mode, t, after);
-        } else {
-            next = detail::ResetSet{fired}.apply(system(), mode, t, after, conflict);
+        Mode next = detail::ResetSet{fired}.apply(system(), mode, t, after, conflict);
+        if constexpr (detail::DecidesAfterSets<System, X>) {
+            next = system().after_set(fired, mode, t, before, after);
         }
         if (!detail::fits_dimension<System>(before, after, next == mode)) {
             y.clear();  // the loop rejects it
@@ -326,7 +305,7 @@ public:
     {
         const X before = head(y);
         X after = before;
-        const Mode next = detail::call_time_reset(system(), mode, t, after);
+        const Mode next = detail::apply_set(detail::TimeReset{}, system(), mode, t, after);
         if (!detail::fits_dimension<System>(before, after, next == mode)) {
             y.clear();
             return mode;

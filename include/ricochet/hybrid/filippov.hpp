@@ -14,8 +14,18 @@
 // and a little beyond, since steps are cut at a surface after they have met it.
 // `surface_rate`, dh/dt along x' = dxdt, is optional but advised: without it the rate
 // is a difference over a displacement of 6e-6 of the largest component of the state,
-// or of 1 where that is larger. `State` and the functions of time events are passed
-// on if they are there.
+// or of 1 where that is larger.
+//
+// Fields may have guards, resets, stops and time events of their own: `guard_count`, `guard`,
+// `guard_rate`, `guard_info`, `reset`, `rest`, `enabled`, `next_time_event`, `time_reset` and their
+// kin, in the forms of a system without modes (hybrid/system.hpp), and a type `State`. They are
+// watched wherever the motion is, beside its surfaces or sliding on them:
+//
+//     std::size_t guard_count = 1;
+//     double guard(std::size_t which, double t, const X& x) const;      // a wall
+//     void reset(std::size_t which, double t, X& x) const;              // rebound
+//
+// Among the guards of `Filippov` they come after those of the surfaces, at `own_guard(i)`.
 //
 // Where both fields lead to a surface the motion slides along it, with the convex
 // combination that keeps h still (Filippov, Differential Equations with Discontinuous
@@ -37,16 +47,21 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <span>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/declarations.hpp"
 #include "ricochet/detail/filippov_decision.hpp"
+#include "ricochet/detail/filippov_events.hpp"
 #include "ricochet/detail/filippov_motion.hpp"
 #include "ricochet/detail/filippov_rates.hpp"
+#include "ricochet/detail/guard_count.hpp"
+#include "ricochet/detail/guard_view.hpp"
 #include "ricochet/detail/scratch.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
@@ -83,6 +98,8 @@ struct FilippovState<Fields> {
 ///     2  exit below     while sliding: zero where the motion may leave to h < 0
 ///     3  exit above     while sliding: zero where it may leave to h > 0
 ///
+/// Guards of the fields follow, `own_guard(i)`, with the properties that the fields declare.
+///
 /// The first two are unilateral, so that no motion continues unseen beyond a surface: a
 /// start on the wrong side is refused, and a run that a reset leaves there ends with
 /// `Outcome::outside_mode`. That may happen where rounding hides a surface, as at the end
@@ -94,25 +111,27 @@ struct FilippovState<Fields> {
 /// shares themselves, a and 1 - a, unless the combination ceases to exist before: then all four
 /// fall together.
 template <class Fields>
-class Filippov : public detail::FilippovState<Fields> {
+class Filippov
+    : public detail::FilippovState<Fields>,
+      public detail::GuardCount<detail::guard_count_with<Fields>(4 * Fields::surface_count)> {
+    using Own = detail::OwnEvents<Fields>;
+    using Count = detail::GuardCount<detail::guard_count_with<Fields>(4 * Fields::surface_count)>;
     using Rules = detail::FilippovDecision<Fields>;
     using Places = detail::Places;
     using Surfaces = detail::Surfaces;
 
 public:
-    static constexpr bool unchecked_names = true;  // time events only where the fields have them
+    static constexpr bool unchecked_names = true;  // some members only where the fields have them
     static constexpr bool forward_only = true;     ///< runs backward in time are refused
-    /// A reset at surfaces removes rounding and drift, which depend on neither the state nor the
-    /// parameters: its derivative is the identity.
-    static constexpr bool resets_settle = true;
     static constexpr std::size_t surface_count = Fields::surface_count;
     static constexpr std::size_t guards_per_surface = 4;
-    static constexpr std::size_t guard_count = guards_per_surface * surface_count;
+    /// Number of guards of the surfaces, before those of the fields.
+    static constexpr std::size_t surface_guards = guards_per_surface * surface_count;
     static constexpr std::size_t mode_count = surface_count == 1 ? 3 : 9;
 
     /// @throws std::invalid_argument if the restoring rate is negative or not finite.
     explicit Filippov(Fields fields = {}, const FilippovOptions& options = {})
-        : rules_(std::move(fields), options)
+        : Count(surface_guards + detail::own_guards(fields)), rules_(std::move(fields), options)
     {
     }
 
@@ -145,8 +164,15 @@ public:
         return detail::filippov_mode_name(surface_count, mode);
     }
 
-    [[nodiscard]] static GuardInfo guard_info(std::size_t which) noexcept
+    /// Number of guard i of the fields among all guards.
+    [[nodiscard]] static constexpr std::size_t own_guard(std::size_t i) noexcept
     {
+        return surface_guards + i;
+    }
+
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const
+    {
+        if (is_own(which)) return detail::own_guard_info<Fields>(own(), which - surface_guards);
         GuardInfo info;
         info.name = detail::filippov_guard_name(which);
         info.unilateral = !is_exit(which);
@@ -155,6 +181,7 @@ public:
 
     [[nodiscard]] static constexpr bool enabled(std::size_t which, Mode mode) noexcept
     {
+        if (is_own(which)) return true;
         const Place at = place(surface_of(which), mode);
         switch (kind_of(which)) {
             case leaves_below: return at == Place::below;
@@ -163,17 +190,29 @@ public:
         }
     }
 
+    /// As the fields' `enabled(which, t, x)`.
+    template <StateVector X>
+    requires detail::EnabledAt<detail::OwnEvents<Fields>, X>
+    [[nodiscard]] bool enabled(std::size_t which, Mode, double t, const X& x) const
+    {
+        return !is_own(which) || detail::call_enabled_at(own(), which - surface_guards, 0, t, x);
+    }
+
     // --- the functions of a hybrid system ---
 
     template <StateVector X>
     void flow(Mode mode, double t, const X& x, X& dxdt) const
     {
+        static_assert(detail::check_fields<Fields, X>());
         rules_.flow(places(mode), t, x, dxdt);
     }
 
     template <StateVector X>
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const X& x) const
     {
+        if constexpr (has_own) {
+            if (is_own(which)) return own_value(which, t, x);
+        }
         if (kind_of(which) == leaves_below) return -rules_.surface(surface_of(which), t, x);
         if (kind_of(which) == leaves_above) return rules_.surface(surface_of(which), t, x);
         return exits(places(mode), t, x)[exit_of(which)];
@@ -190,15 +229,21 @@ public:
             g[first + exits_below] = exit[2 * surface];
             g[first + exits_above] = exit[2 * surface + 1];
         }
+        if constexpr (has_own) detail::call_guards(own(), 0, t, x, g.subspan(surface_guards));
     }
 
     /// The rate of a surface, set to zero if its sign is only rounding: then the
     /// side to which a motion tangent to its surface bends is found from its curvature.
-    /// Rates of exits are differences.
+    /// Rates of exits are differences, and so are those of guards of the fields whose rate is
+    /// neither given nor found by dual numbers: over the same displacement as those of the
+    /// surfaces.
     template <StateVector X>
     [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const X& x,
                                     const X& dxdt) const
     {
+        if constexpr (has_own) {
+            if (is_own(which)) return own_rate(which, t, x, dxdt);
+        }
         const Places at = places(mode);
         if (is_exit(which)) return exit_rates(at, t, x, dxdt)[exit_of(which)];
         const double rate = surface_rate(surface_of(which), at, t, x, dxdt);
@@ -219,12 +264,56 @@ public:
             rates[first + exits_below] = exit[2 * surface];
             rates[first + exits_above] = exit[2 * surface + 1];
         }
+        if constexpr (has_own) own_rates(t, x, dxdt, rates.subspan(surface_guards));
     }
 
-    /// Mode after a motion has met surfaces, or may leave the surfaces on which it
-    /// slides; x is moved onto the surfaces on which it is to slide or has slid, by the
-    /// rounding and drift that separates it from them, along the jumps of the field. The
-    /// decision is made exactly on the surfaces.
+    // --- resets of the fields; those at surfaces are left to `after_set` ---
+
+    template <StateVector X>
+    requires(!detail::ResetsTogether<detail::OwnEvents<Fields>, X> &&
+             !detail::DirectedReset<detail::OwnEvents<Fields>, X>) [[nodiscard]] Mode
+        reset(std::size_t which, Mode mode, double t, X& x) const
+    {
+        if constexpr (Resetting<Own, X>) {
+            if (is_own(which)) (void)detail::call_reset(own(), which - surface_guards, 0, t, x);
+        }
+        return mode;
+    }
+    template <StateVector X>
+    requires detail::DirectedReset<detail::OwnEvents<Fields>, X>
+    [[nodiscard]] Mode reset(std::size_t which, Crossing direction, Mode mode, double t, X& x) const
+    {
+        if (is_own(which))
+            (void)detail::call_reset(own(), which - surface_guards, direction, 0, t, x);
+        return mode;
+    }
+    /// Where the fields reset all guards that fired together.
+    template <StateVector X>
+    requires detail::ResetsTogether<detail::OwnEvents<Fields>, X>
+    [[nodiscard]] Mode reset(const FiredGuards& fired, Mode mode, double t, X& x) const
+    {
+        std::vector<std::size_t> guards;
+        for (const std::size_t which : fired) {
+            if (is_own(which)) guards.push_back(which - surface_guards);
+        }
+        if (!guards.empty()) {
+            (void)detail::call_reset_set(own(), FiredGuards(guards, fired.time_event()), 0, t, x);
+        } else if (fired.time_event()) {
+            (void)detail::call_time_reset(own(), 0, t, x);
+        }
+        return mode;
+    }
+    /// Whether the reset of a guard only removes rounding and drift, which depend on neither the
+    /// state nor the parameters: its derivative is the identity.
+    [[nodiscard]] static constexpr bool settles(std::size_t which) noexcept
+    {
+        return !is_own(which);
+    }
+
+    /// Mode after a set of events, decided after all resets of the fields, which led from `before`
+    /// to x. x is moved onto the surfaces on which it is to slide or has slid, by the rounding and
+    /// drift that separates it from them, along the jumps of the field. The decision is made
+    /// exactly on the surfaces.
     ///
     /// On one surface: a field that leads away from it on its own side is an exit. If there is
     /// none, the surface attracts and the motion slides. If there is one, it is taken. If there are
@@ -240,21 +329,26 @@ public:
     /// decision starts from the weights with which the motion arrives; after an exit, from those
     /// a moment later; at a start or time event, from (1/2, 1/2).
     ///
+    /// Where resets have moved the state, nothing of this history counts: a surface that was met
+    /// and whose h the resets have left alone, and one to which they have moved the state, within
+    /// the rounding of its terms, are decided as at a start; beside the others, also those along
+    /// which it slid, the sign of h decides. A fired exit counts only if the set changed nothing.
+    ///
     /// `meeting` returns the result in advance.
     template <StateVector X>
-    [[nodiscard]] Mode reset(const FiredGuards& fired, Mode mode, double t, X& x) const
+    [[nodiscard]] Mode after_set(const FiredGuards& fired, Mode mode, double t, const X& before,
+                                 X& x) const
     {
-        Places from = places(mode);
-        bool exits_only = !fired.time_event();
-        if (fired.time_event()) from = after_time_event(from, t, x);
-        Surfaces on = Rules::sliding_in(from) | rules_.reached_in(from, t, x);
-        typename Rules::FiredExits exits = 0;
-        for (const std::size_t which : fired) {
-            on |= Rules::bit(surface_of(which));
-            if (is_exit(which)) exits |= 1u << exit_of(which);
-            exits_only = exits_only && is_exit(which);
+        if (!detail::same_state(before, x)) {
+            return decide_anew(places(mode), met_by(fired), t, before, x);
         }
-        if (!exits_only) exits = 0;
+        if (met_by(fired) == 0) {
+            if (!fired.time_event()) return mode;
+            return number(rules_.decide(places(mode), Rules::sliding_in(places(mode)), t, x));
+        }
+        const Places from = places(mode);
+        const Surfaces on = Rules::sliding_in(from) | rules_.reached_in(from, t, x) | met_by(fired);
+        typename Rules::FiredExits exits = fired.time_event() ? 0 : exits_in(fired);
         if (on != Rules::both) {
             const Places next = rules_.meet(on, from, t, x, [&](const X& there) {
                 return rules_.decide_on_one(from, on, exits, t, there);
@@ -271,23 +365,32 @@ public:
     }
 
     /// An accumulation of crossings of two surfaces leads onto their intersection. There is no
-    /// other accumulation that Filippov's rule could continue: an accumulation of crossings of one
-    /// surface is sliding of second order, which needs the rate of h as a second surface.
-    /// With one surface there is no `rest`, and such a run ends. With two, `rest` sets the state
-    /// to NaN, which ends the run.
+    /// other accumulation of crossings that Filippov's rule could continue: one of crossings of one
+    /// surface is sliding of second order, which needs the rate of h as a second surface. Such a
+    /// run ends; with two surfaces `rest` sets the state to NaN.
+    ///
+    /// Where events of a guard of the fields accumulate, also together with crossings of a surface,
+    /// the motion rests as the fields say.
     template <StateVector X>
-    requires(surface_count == 2) [[nodiscard]] Mode
+    requires(surface_count == 2 || Resting<detail::OwnEvents<Fields>, X>) [[nodiscard]] Mode
         rest(std::size_t which, Mode mode, double t, X& x) const
     {
-        const std::size_t other = 1 - surface_of(which);
-        const Places from = places(mode);
-        if (from[other] != Place::sliding && !rules_.is_near(other, t, x)) {
-            detail::for_each_component(
-                x, [&](auto i) { x[i] = std::numeric_limits<double>::quiet_NaN(); });
-            return mode;
+        if constexpr (Resting<Own, X>) {
+            if (is_own(which)) {
+                const X before = x;
+                (void)detail::call_rest(own(), which - surface_guards, 0, t, x);
+                if (detail::same_state(before, x)) return mode;
+                return decide_anew(places(mode), 0, t, before, x);
+            }
         }
-        rules_.settle(Rules::both, from, Rules::held_on(Rules::both, from), t, x);
-        return number(rules_.decide_on_both({}, t, x));
+        if constexpr (surface_count == 2) return rest_on_both(surface_of(which), mode, t, x);
+        return mode;
+    }
+    /// Whether `rest` continues an accumulation of events of guard `which` and another one.
+    [[nodiscard]] static constexpr bool rests(std::size_t which, std::size_t other) noexcept
+    {
+        if (is_own(which)) return own_rests;
+        return surface_count == 2 && (other == no_guard || !is_own(other));
     }
 
     // --- time events of the fields ---
@@ -308,14 +411,14 @@ public:
         return fields().next_time_event(t, x);
     }
 
-    /// Applies the jump of the fields' own `time_reset`, if any. Fields may also have changed:
-    /// the sliding surfaces are decided again.
+    /// The jump of the fields' own `time_reset`. The places are decided in `after_set`, also where
+    /// there is none, since the fields may have changed.
     template <StateVector X>
-    [[nodiscard]] Mode time_reset(Mode mode, double t,
-                                  X& x) const requires Timed<Fields> || TimedByState<Fields, X>
+    [[nodiscard]] Mode time_reset(Mode mode, double t, X& x)
+        const requires detail::TimeResetting<detail::OwnEvents<Fields>, X>
     {
-        const Places from = after_time_event(places(mode), t, x);
-        return number(rules_.decide(from, Rules::sliding_in(from), t, x));
+        (void)detail::call_time_reset(own(), 0, t, x);
+        return mode;
     }
 
     // --- queries ---
@@ -359,6 +462,10 @@ public:
     }
 
 private:
+    static constexpr std::size_t fixed_own = detail::own_guard_count<Fields>();
+    static constexpr bool has_own = fixed_own > 0;
+    static constexpr bool own_rests = detail::own_guards_rest<Fields>();
+
     enum Kind : std::size_t { leaves_below, leaves_above, exits_below, exits_above };
 
     [[nodiscard]] static constexpr std::size_t surface_of(std::size_t which) noexcept
@@ -426,21 +533,105 @@ private:
         return std::fabs(rate) <= Rules::template negligible<X> * size ? 0 : rate;
     }
 
-    /// Places of the motion after the fields' own time reset: off the surfaces on which it
-    /// slid, if that has moved it.
-    template <class X>
-    [[nodiscard]] Places after_time_event(Places at, double t, X& x) const
+    // --- guards of the fields ---
+
+    [[nodiscard]] const Own& own() const noexcept { return rules_.fields(); }
+    [[nodiscard]] static constexpr bool is_own(std::size_t which) noexcept
     {
-        if constexpr (requires { fields().time_reset(t, x); }) {
-            std::array<double, 2> before{};
-            for (std::size_t i = 0; i < surface_count; ++i) before[i] = rules_.surface(i, t, x);
-            fields().time_reset(t, x);
-            for (std::size_t i = 0; i < surface_count; ++i) {
-                const double h = rules_.surface(i, t, x);
-                if (h != before[i]) at[i] = h > 0 ? Place::above : Place::below;
+        return has_own && which >= surface_guards;
+    }
+
+    template <class X>
+    [[nodiscard]] double own_value(std::size_t which, double t, const X& x) const
+    {
+        std::uint64_t calls = 0;  // the loop counts them
+        return GuardView<Own, X>(own(), calls, {which - surface_guards, 0}).value(t, x);
+    }
+    template <class X>
+    [[nodiscard]] double own_rate(std::size_t which, double t, const X& x, const X& dxdt) const
+    {
+        std::uint64_t calls = 0;
+        const double size = detail::greatest_of(1.0, detail::largest_component(x));
+        const double speed = detail::largest_component(dxdt);
+        const double scale =
+            0.6 * (speed > 0 ? size / speed : detail::greatest_of(1.0, std::fabs(t)));
+        return GuardView<Own, X>(own(), calls, {which - surface_guards, 0}).rate(t, x, dxdt, scale);
+    }
+    template <class X>
+    void own_rates(double t, const X& x, const X& dxdt, std::span<double> rates) const
+    {
+        if constexpr (detail::RatesTogether<Own, X>) {
+            detail::call_rates(own(), detail::Along<X>{0, t, x, dxdt}, rates);
+        } else {
+            for (std::size_t i = 0; i < rates.size(); ++i) {
+                rates[i] = own_rate(own_guard(i), t, x, dxdt);
             }
         }
-        return at;
+    }
+
+    // --- decisions ---
+
+    /// The surfaces whose guards have fired.
+    [[nodiscard]] static Surfaces met_by(const FiredGuards& fired) noexcept
+    {
+        Surfaces met = 0;
+        for (const std::size_t which : fired) {
+            if (!is_own(which)) met |= Rules::bit(surface_of(which));
+        }
+        return met;
+    }
+
+    /// The exits that have fired, if no motion beside a surface has met it together with them.
+    [[nodiscard]] static typename Rules::FiredExits exits_in(const FiredGuards& fired) noexcept
+    {
+        typename Rules::FiredExits exits = 0;
+        for (const std::size_t which : fired) {
+            if (is_own(which)) continue;
+            if (!is_exit(which)) return 0;
+            exits |= 1u << exit_of(which);
+        }
+        return exits;
+    }
+
+    /// The mode after resets that have moved the state from `before` to x; the surfaces in `met`
+    /// had been met at `before`.
+    template <class X>
+    [[nodiscard]] Mode decide_anew(Places at, Surfaces met, double t, const X& before, X& x) const
+    {
+        met |= Rules::sliding_in(at) | rules_.reached_in(at, t, before);
+        Surfaces on = 0;
+        for (std::size_t i = 0; i < surface_count; ++i) {
+            const double h = rules_.surface(i, t, x);
+            const double rounding = rules_.rounding(i, t, before, x);
+            const bool is_met = met & Rules::bit(i);
+            const bool stays = before.size() == x.size() &&
+                               std::fabs(h - rules_.surface(i, t, before)) <= rounding;
+            const bool is_on = stays ? is_met : std::fabs(h) <= rounding;
+            if (is_on) {
+                on |= Rules::bit(i);
+                at[i] = Place::sliding;
+            } else if (!stays) {
+                at[i] = h > 0 ? Place::above : Place::below;
+            }
+        }
+        if (on == 0) return number(at);
+        return number(rules_.meet(on, at, t, x,
+                                  [&](const X& there) { return rules_.decide(at, on, t, there); }));
+    }
+
+    /// The rest at the limit of crossings of two surfaces.
+    template <class X>
+    [[nodiscard]] Mode rest_on_both(std::size_t surface, Mode mode, double t, X& x) const
+    {
+        const std::size_t other = 1 - surface;
+        const Places from = places(mode);
+        if (from[other] != Place::sliding && !rules_.is_near(other, t, x)) {
+            detail::for_each_component(
+                x, [&](auto i) { x[i] = std::numeric_limits<double>::quiet_NaN(); });
+            return mode;
+        }
+        rules_.settle(Rules::both, from, Rules::held_on(Rules::both, from), t, x);
+        return number(rules_.decide_on_both({}, t, x));
     }
 
     Rules rules_;

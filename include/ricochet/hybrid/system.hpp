@@ -281,6 +281,14 @@ concept ResetsAlone = DirectedReset<System, X> || ModedResetOf<System, X> || Pla
 template <class System, class X>
 concept ResetsTogether = ModedSetReset<System, X> || PlainSetReset<System, X>;
 
+/// A system that decides its mode again after the resets of every set, of guards or a time event:
+/// `fired` led from the mode and the state `before` to x, and may still move x. For systems of the
+/// library.
+template <class System, class X>
+concept DecidesAfterSets = requires(const System& system, const FiredGuards& fired, Mode mode, double t, const X& before, X& x) {
+    { system.after_set(fired, mode, t, before, x) } -> std::convertible_to<Mode>;
+};
+
 // --- rest ---
 
 template <class System, class X>
@@ -301,6 +309,14 @@ concept ModedSingleRest = !CountsGuards<System> && requires(const System& system
 template <class System, class X>
 concept PlainSingleRest = !CountsGuards<System> && requires(const System& system, double t, X& x) {
     system.rest(t, x);
+};
+
+/// A system whose `rest` has an answer only for guards for which `rests(which, other)` holds, where
+/// their events accumulate together with those of another one, or of `no_guard`. For systems of the
+/// library.
+template <class System>
+concept RestsAtSome = requires(const System& system, std::size_t which) {
+    { system.rests(which, which) } -> std::same_as<bool>;
 };
 
 // --- properties of guards ---

@@ -647,7 +647,7 @@ requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
 /// Runs an inclusion alone: `hand_over`.
 ///
 /// @throws std::invalid_argument as above, and for options that it does not use: `mode`, `step`,
-///         `h_min`, `event_rtol`, `event_window`, `check_inside`, `stall_steps`.
+///         `h_min`, `event_rtol`, `event_window`, `check_inside`.
 template <class System, class X, class Stepping = ErrorControlled<Dopri5>>
 requires NotIntegrable<System, X> && Inclusion<System>
 [[nodiscard]] HandOverRun<System> integrate(const System& system, const X& w0,

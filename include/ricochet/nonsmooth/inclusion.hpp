@@ -485,6 +485,8 @@ void check_projection(const Set& set)
 //     offset_rate(t, s)                its rate; else a difference, which is wrong beside a kink
 //     branch_bound(t, w, i, branch)    a bound that continues smoothly beyond y = 0, see
 //                                      branch_modes.hpp
+//     static_bound(t, w, i)            the largest |reaction i| while it holds y_i at zero, at
+//                                      least its bounds beside y_i = 0: static friction
 //     bound_gradient(t, w, i, g)       d upper_i / dw of a BoxSet of symmetric intervals
 //                                      that depend on the state
 //
@@ -524,6 +526,15 @@ concept Inclusion = requires(const System& system, double t, const StateOf<Syste
     {
         system.reaction_set(t, w)
         } -> ConvexSet;
+};
+
+/// Reactions that hold more than they have where y moves: static friction above kinetic friction.
+template <class System>
+concept HasStaticBound = requires(const System& system, const StateOf<System>& w)
+{
+    {
+        system.static_bound(0.0, w, 0)
+        } -> std::convertible_to<double>;
 };
 
 template <class System>

@@ -446,6 +446,10 @@ using MotionOf =
 /// the same bits.
 template <Inclusion System>
 class SetValuedMotion : public detail::MotionOf<System> {
+    static_assert(!HasStaticBound<System>,
+                  "ricochet: found static_bound in an inclusion that is to be followed by "
+                  "set-valued steps, which know of none; expected hand_over or integrate");
+
 public:
     /// Starts with the minimal selection. Debug builds test the projection of the first set.
     /// @throws std::invalid_argument for invalid options, systems and initial

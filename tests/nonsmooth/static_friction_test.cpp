@@ -1,0 +1,322 @@
+// Reactions that hold more than they have where y moves: static friction above kinetic friction.
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "ricochet/integrate/simulation.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
+
+namespace ricochet::static_friction_test {
+namespace {
+
+constexpr double never = std::numeric_limits<double>::infinity();
+
+/// w' = F(t) - R, |R| <= kinetic where w moves and <= static where it rests.
+struct Block {
+    static constexpr int state_size = 1, reaction_size = 1;
+    using W = Eigen::Matrix<double, 1, 1>;
+    std::function<double(double)> load;
+    double at_rest = 1, kinetic = 0.5;
+
+    void smooth(double t, const W& w, W& f) const { f[0] = load(t) + 0 * w[0]; }
+    [[nodiscard]] sets::IntervalSet reaction_set(double, const W&) const
+    {
+        return sets::IntervalSet::symmetric(kinetic);
+    }
+    [[nodiscard]] double static_bound(double, const W&, int) const { return at_rest; }
+};
+
+HandOverRun<Block> slide(const Block& block, double w0, double t_end)
+{
+    return hand_over(block, Block::W{w0}, {.t_end = t_end});
+}
+
+TEST(StaticFriction, ABlockSlipsWhereItsLoadPassesTheStaticBound)
+{
+    const auto run = slide({.load = [](double t) { return t / 5; }}, 0, 6);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.events.size(), 1u);
+    EXPECT_EQ(run.events[0].kind, EventKind::slip);
+    EXPECT_NEAR(run.events[0].t, 5, 1e-12);
+    EXPECT_NEAR(run.state.w[0], 0.6, 1e-10);
+    EXPECT_NEAR(run.state.reaction[0], -0.5, 1e-15);
+    const auto back = slide({.load = [](double t) { return -t / 5; }}, 0, 6);
+    EXPECT_NEAR(back.state.w[0], -0.6, 1e-10);
+}
+
+TEST(StaticFriction, ALoadThatRestsAtTheStaticBoundMovesNothing)
+{
+    const auto equal = slide({.load = [](double t) { return std::min(t, 1.0); }}, 0, 2);
+    EXPECT_EQ(equal.outcome, Outcome::reached_end);
+    EXPECT_EQ(equal.events.size(), 0u);
+    EXPECT_EQ(equal.state.w[0], 0);
+    const auto more = slide({.load = [](double t) { return std::min(t, 1 + 1e-6); }}, 0, 2);
+    ASSERT_EQ(more.events.size(), 1u);
+    EXPECT_NEAR(more.events[0].t, 1, 1e-12);
+    EXPECT_NEAR(more.state.w[0], 0.500001, 1e-9);
+    const auto constant = slide({.load = [](double) { return 1.0; }}, 0, 2);
+    EXPECT_EQ(constant.state.w[0], 0);
+    EXPECT_EQ(constant.events.size(), 0u);
+    const auto touches = slide({.load = [](double t) { return 2 * t - t * t; }}, 0, 2);
+    EXPECT_EQ(touches.state.w[0], 0);
+    EXPECT_EQ(touches.events.size(), 0u);
+}
+
+TEST(StaticFriction, ABlockThatStopsIsHeldThoughTheKineticLawWouldLetItTurn)
+{
+    const auto run = slide({.load = [](double) { return -0.7; }}, 1.2, 3);
+    ASSERT_EQ(run.events.size(), 1u);
+    EXPECT_EQ(run.events[0].kind, EventKind::stick);
+    EXPECT_NEAR(run.events[0].t, 1, 1e-12);
+    EXPECT_EQ(run.state.w[0], 0);
+    EXPECT_NEAR(run.state.reaction[0], 0.7, 1e-15);
+    const auto turns = slide({.load = [](double) { return -1.1; }}, 1.6, 3);
+    ASSERT_EQ(turns.events.size(), 1u);
+    EXPECT_EQ(turns.events[0].kind, EventKind::mode);
+    EXPECT_NEAR(turns.state.w[0], -0.6 * 2, 1e-10);
+}
+
+// Stick and slip on a belt, whose period has a closed form.
+struct Belt {
+    static constexpr int state_size = 2, reaction_size = 1;
+    using W = Eigen::Vector2d;
+    void smooth(double, const W& w, W& f) const { f << w[1], -w[0]; }
+    [[nodiscard]] sets::IntervalSet reaction_set(double, const W&) const
+    {
+        return sets::IntervalSet::symmetric(0.5);
+    }
+    [[nodiscard]] double static_bound(double, const W&, int) const { return 1; }
+    void observe(Eigen::Matrix<double, 1, 2>& e) const { e << 0, 1; }
+    void offset(double, Eigen::Matrix<double, 1, 1>& s) const { s[0] = 0.2; }
+    void offset_rate(double, Eigen::Matrix<double, 1, 1>& rate) const { rate[0] = 0; }
+};
+
+// It is carried to x = 1, slides about 1/2 with amplitude r and phase a until it is as fast as the
+// belt again at x = 0, and is carried over the distance 1 once more.
+TEST(StaticFriction, ABlockOnABeltSticksAndSlipsWithItsPeriod)
+{
+    const double a = std::atan2(0.2, 0.5);
+    const double slides = std::numbers::pi + 2 * a, carried = 1 / 0.2;
+    const auto run = hand_over(Belt{}, Belt::W(0, 0.2), {.t_end = 100});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_GE(run.events.size(), 18u);
+    for (std::size_t k = 0; k < run.events.size(); ++k) {
+        const double rounds = static_cast<double>(k / 2);
+        const bool slip = k % 2 == 0;
+        EXPECT_EQ(run.events[k].kind, slip ? EventKind::slip : EventKind::stick);
+        EXPECT_NEAR(run.events[k].t, rounds * (slides + carried) + carried + (slip ? 0 : slides),
+                    1e-8);
+    }
+}
+
+/// Two joints, w' = W (f + r), W = [[1, -1], [-1, 2]].
+struct Joints {
+    static constexpr int state_size = 2, reaction_size = 2;
+    using W = Eigen::Vector2d;
+    double second = -0.8, kinetic = 0.5;
+
+    void smooth(double t, const W&, W& f) const { f << t - second, -t + 2 * second; }
+    [[nodiscard]] sets::Box<2> reaction_set(double, const W&) const
+    {
+        return {{-kinetic, -kinetic}, {kinetic, kinetic}};
+    }
+    [[nodiscard]] double static_bound(double, const W&, int) const { return 1; }
+    void act(Eigen::Matrix2d& g) const { g << 1, -1, -1, 2; }
+};
+
+void expect_slips(const HandOverRun<Joints>& run, double first, double second)
+{
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.events.size(), 2u);
+    for (const auto& event : run.events) EXPECT_EQ(event.kind, EventKind::slip);
+    EXPECT_EQ(run.events[0].reaction, 0u);
+    EXPECT_EQ(run.events[1].reaction, 1u);
+    EXPECT_NEAR(run.events[0].t, first, 1e-11);
+    EXPECT_NEAR(run.events[1].t, second, 1e-11);
+}
+
+TEST(StaticFriction, AReactionThatFallsToItsKineticBoundMayReleaseAnother)
+{
+    const auto both = hand_over(Joints{}, Joints::W(0, 0), {.t_end = 2});
+    expect_slips(both, 1, 1);
+    EXPECT_NEAR(both.state.w[0], 1.3, 1e-10);
+    EXPECT_NEAR(both.state.w[1], -1.6, 1e-10);
+    const auto later = hand_over(Joints{.second = -0.7}, Joints::W(0, 0), {.t_end = 2});
+    expect_slips(later, 1, 1.1);
+    EXPECT_NEAR(later.state.w[0], 1.1525, 1e-10);
+    EXPECT_NEAR(later.state.w[1], -1.305, 1e-10);
+    const auto equal = hand_over(Joints{.kinetic = 1}, Joints::W(0, 0), {.t_end = 2});
+    expect_slips(equal, 1, 1.4);
+    EXPECT_NEAR(equal.state.w[0], 0.34, 1e-10);
+    EXPECT_NEAR(equal.state.w[1], -0.18, 1e-10);
+}
+
+// --- beside events ---
+
+/// The block as a system with a clock, whose ticks may turn it or do nothing.
+struct Ticking {
+    using State = std::array<double, 1>;
+    Block block;
+    double tick = 1;
+    bool turns = false;
+    std::array<double, 2> at_tick = {0, 0};
+
+    void flow(double t, const State& x, State& v) const
+    {
+        const double bound = block.kinetic;
+        v[0] = block.load(t) - (x[0] > 0 ? bound : x[0] < 0 ? -bound : 0);
+    }
+    [[nodiscard]] double next_time_event(double t) const { return t < tick ? tick : never; }
+    void time_reset(double, State& x) const
+    {
+        if (turns) x[0] = -x[0];
+    }
+    [[nodiscard]] const Block& set_valued() const { return block; }
+};
+
+MixedRun<std::array<double, 1>> tick(const Ticking& system, double w0, double t_end)
+{
+    return integrate(system, {w0}, {.t_end = t_end, .rtol = 1e-10, .atol = 1e-12});
+}
+
+TEST(StaticFriction, ATickAtTheStaticBoundChangesNothing)
+{
+    const auto rests = tick({.block = {.load = [](double t) { return std::min(t, 1.0); }}}, 0, 2);
+    EXPECT_EQ(rests.outcome, Outcome::reached_end);
+    EXPECT_EQ(rests.x[0], 0);
+    EXPECT_EQ(rests.events.size(), 1u);
+    const auto slips =
+        tick({.block = {.load = [](double t) { return std::min(t, 1 + 1e-6); }}, .tick = 1 + 1e-6},
+             0, 2);
+    EXPECT_NEAR(slips.x[0], 0.500001, 1e-9);
+    // A load that is gone at the tick at which it meets the bound.
+    const auto gone = tick({.block = {.load = [](double t) { return t < 1 ? t : 0; }}}, 0, 2);
+    EXPECT_EQ(gone.x[0], 0);
+    ASSERT_EQ(gone.events.size(), 1u);
+    EXPECT_EQ(gone.events[0].kind, EventKind::time);
+}
+
+TEST(StaticFriction, AResetThatCarriesTheBlockAcrossRestIsNoStop)
+{
+    const auto run = tick(
+        {.block = {.load = [](double) { return -0.7; }}, .tick = 0.5, .turns = true}, 1.2, 1.5);
+    EXPECT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_NEAR(run.x[0], -0.8, 1e-9);
+    for (const auto& event : run.events) EXPECT_NE(event.kind, EventKind::stick);
+}
+
+TEST(StaticFriction, ASimulationGoesOnFromASnapshotOfAHeldBlock)
+{
+    const Ticking system{.block = {.load = [](double t) { return t / 5; }}, .tick = 3};
+    const Options options{.t_end = 6, .rtol = 1e-10, .atol = 1e-12};
+    Simulation first(system, std::array{0.0}, options);
+    while (first.t() < 4) (void)first.step();
+    Simulation second(system, std::array{0.0}, options);
+    second.restore(first.save());
+    while (!second.ended()) (void)second.step();
+    EXPECT_NEAR(second.x()[0], 0.6, 1e-9);
+}
+
+/// Two blocks on one another: y = w0 - w1, friction 1, unit masses. A tick sets both to speeds that
+/// are equal up to rounding.
+struct Pair {
+    static constexpr int state_size = 2, reaction_size = 1;
+    using W = Eigen::Vector2d;
+    void smooth(double, const W&, W& f) const { f.setZero(); }
+    [[nodiscard]] sets::IntervalSet reaction_set(double, const W&) const { return {-1, 1}; }
+    void observe(Eigen::Matrix<double, 1, 2>& e) const { e << 1, -1; }
+};
+struct TickingPair {
+    using State = std::array<double, 2>;
+    Pair pair;
+    void flow(double, const State& x, State& v) const
+    {
+        const double r = x[0] > x[1] ? -1 : x[0] < x[1] ? 1 : 0;
+        v = {r, -r};
+    }
+    [[nodiscard]] double next_time_event(double t) const { return t < 1 ? 1 : never; }
+    void time_reset(double, State& x) const { x = {0.3, 0.1 + 0.2}; }
+    [[nodiscard]] const Pair& set_valued() const { return pair; }
+};
+
+TEST(StaticFriction, SpeedsThatAreEqualUpToRoundingAreHeldOn)
+{
+    const auto run = integrate(TickingPair{}, {1.0, 0.0}, {.t_end = 3});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.events.size(), 2u);
+    EXPECT_EQ(run.events[0].kind, EventKind::stick);
+    EXPECT_NEAR(run.events[0].t, 0.5, 1e-12);
+    EXPECT_EQ(run.events[1].kind, EventKind::time);
+    EXPECT_NEAR(run.x[0], 0.3, 1e-15);
+    EXPECT_NEAR(run.x[1], 0.3, 1e-15);
+}
+
+// --- refusals ---
+
+TEST(StaticFriction, AStaticBoundBelowTheKineticOneIsRefused)
+{
+    const Block block{.load = [](double) { return 0.0; }, .at_rest = 0.4};
+    try {
+        (void)slide(block, 0, 1);
+        FAIL() << "not refused";
+    } catch (const std::invalid_argument& error) {
+        const std::string text = error.what();
+        EXPECT_NE(text.find("static bound"), std::string::npos) << text;
+        EXPECT_NE(text.find("0.4"), std::string::npos) << text;
+        EXPECT_NE(text.find("0.5"), std::string::npos) << text;
+    }
+}
+
+/// Static friction that is written into the set.
+struct Jumping {
+    static constexpr int state_size = 1, reaction_size = 1;
+    using W = Eigen::Matrix<double, 1, 1>;
+    void smooth(double t, const W&, W& f) const { f[0] = t; }
+    [[nodiscard]] sets::IntervalSet reaction_set(double, const W& w) const
+    {
+        return sets::IntervalSet::symmetric(w[0] == 0 ? 1 : 0.5);
+    }
+};
+
+TEST(StaticFriction, ASetThatJumpsWhereTheMotionRestsIsRefused)
+{
+    for (const double w0 : {0.0, 3.0}) {
+        try {
+            (void)hand_over(Jumping{}, Jumping::W{w0}, {.t_end = 1});
+            FAIL() << "not refused";
+        } catch (const std::invalid_argument& error) {
+            EXPECT_NE(std::string(error.what()).find("static_bound"), std::string::npos);
+        }
+    }
+}
+
+/// Two contacts of one block share its load in many ways.
+struct OneBlock {
+    static constexpr int state_size = 1, reaction_size = 2;
+    using W = Eigen::Matrix<double, 1, 1>;
+    void smooth(double t, const W&, W& f) const { f[0] = t; }
+    [[nodiscard]] sets::Box<2> reaction_set(double, const W&) const
+    {
+        return {{-0.5, -1.5}, {0.5, 1.5}};
+    }
+    [[nodiscard]] double static_bound(double, const W&, int i) const { return i == 0 ? 1 : 3; }
+    void observe(Eigen::Matrix<double, 2, 1>& e) const { e << 1, 1; }
+};
+
+TEST(StaticFriction, ReactionsThatYDoesNotDetermineEndTheRunWithItsReason)
+{
+    const auto run = hand_over(OneBlock{}, OneBlock::W{0}, {.t_end = 6});
+    EXPECT_EQ(run.outcome, Outcome::not_handed_over);
+}
+
+}  // namespace
+}  // namespace ricochet::static_friction_test
