@@ -32,14 +32,15 @@ DetectorCase with(const std::string& name, const Detector& detector, Evidence cl
 
 std::vector<DetectorCase> all()
 {
-    // Nothing can be proved about a host's step, which has no polynomial.
-    return {with("Ends", Ends{}, Evidence::assumed, 1),
+    // Nothing can be proved about a host's step, which has no polynomial. Around an end at which
+    // the guard is zero it is evaluated at up to four other places.
+    return {with("Ends", Ends{}, Evidence::assumed, 5),
             with("Extremum", Extremum{}, Evidence::checked, 61),
             with("Bernstein", Bernstein{}, Evidence::checked, 100'000),
             // The choice of steps that it clears is tested elsewhere; this tests the other steps.
-            with("Network", network(), Evidence::assumed, 2),
+            with("Network", network(), Evidence::assumed, 6),
             with("VerifiedExtremum", Verified<Extremum>(network()), Evidence::checked, 61),
-            with("VerifiedEnds", Verified<Ends>(network(), Ends{}), Evidence::assumed, 1)};
+            with("VerifiedEnds", Verified<Ends>(network(), Ends{}), Evidence::assumed, 5)};
 }
 
 INSTANTIATE_TEST_SUITE_P(All, DetectorSuite, testing::ValuesIn(all()),
