@@ -39,6 +39,7 @@ std::string_view name(Outcome outcome) noexcept
         case Outcome::not_handed_over: return "not_handed_over";
         case Outcome::released: return "released";
         case Outcome::law_violated: return "law_violated";
+        case Outcome::several: return "several";
         case Outcome::running: return "running";
     }
     return "unknown";
@@ -103,6 +104,9 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::law_violated:
             return "a step ended with a reaction that contradicts its law; check reaction_set, "
                    "or take shorter steps";
+        case Outcome::several:
+            return "several motions satisfy the law of the reactions here, and nothing says which "
+                   "one follows; start beside it, or check the signs of observe and act";
         case Outcome::running: return "the run has not ended";
     }
     return "unknown outcome";
@@ -135,7 +139,10 @@ std::string detail::describe_run(Outcome outcome, const std::string& reason,
                                  const std::vector<std::size_t>& armed_beyond)
 {
     std::string out(describe(outcome));
-    if (!reason.empty()) out = "a reset ended the run: " + reason;
+    if (!reason.empty()) {
+        const bool by_reset = outcome == Outcome::stopped_by_event;
+        out = by_reset ? "a reset ended the run: " + reason : out + ": " + reason;
+    }
     if (armed_beyond.empty()) return out;
     out += armed_beyond.size() == 1 ? "; guard " : "; guards ";
     for (std::size_t i = 0; i < armed_beyond.size(); ++i) {
