@@ -87,6 +87,8 @@ typedef enum rc_crossing {
 #define RC_NO_GUARD ((size_t)-1)
 /** Stands for the reset of a time event in place of the number of a guard. */
 #define RC_TIME_EVENT_RESET ((size_t)-2)
+/** Stands for "no reaction" in place of the number of a reaction. */
+#define RC_NO_REACTION ((size_t)-1)
 
 /** Properties of a guard. All fields but the size may be zero. */
 typedef struct rc_guard_info {
@@ -154,6 +156,50 @@ typedef int (*rc_bound_fn)(void* user, size_t which, rc_mode mode, double t, con
  *  unchanged, NaN, if the system has no such parameter. */
 typedef int (*rc_parameter_fn)(void* user, const char* name, double* value);
 
+/* Callbacks of set-valued motion: `w` is the state, with `n` doubles. */
+
+/** Writes f(t, w) of an rc_inclusion into `f`, all n doubles. */
+typedef int (*rc_smooth_fn)(void* user, rc_mode mode, double t, const double* w, double* f,
+                            size_t n);
+/** Writes the bounds of the `m` reactions into `lower` and `upper`; -INFINITY and INFINITY: none.
+ */
+typedef int (*rc_reaction_bounds_fn)(void* user, rc_mode mode, double t, const double* w, size_t n,
+                                     double* lower, double* upper, size_t m);
+/** Writes s(t) and its rate s'(t), `m` doubles each. */
+typedef int (*rc_surface_fn)(void* user, rc_mode mode, double t, double* s, double* rate, size_t m);
+/** The reset of a change of reaction `which`; `kind` is RC_STICK, RC_SLIP or RC_MODE. Changes the
+ *  mode and the state in place. */
+typedef int (*rc_change_fn)(void* user, size_t which, int32_t kind, rc_mode* mode, double t,
+                            double* x, size_t n);
+/** Replaces the mode by the one in which the flow of the system is followed again from (t, x). */
+typedef int (*rc_start_mode_fn)(void* user, rc_mode* mode, double t, const double* x, size_t n);
+
+/** Set-valued motion of the state of a system: dry friction, relays, diodes, stops.
+ *
+ *      A w' = f(t, w) + G r,   y = E w - s(t),   lower <= r <= upper,
+ *
+ *  r at its upper bound where y < 0, at its lower bound where y > 0, in between where y = 0. The
+ *  flow of the system is followed while every y is clear of zero. Matrices are stored by rows.
+ *  Zero the struct, then set its size and other members. Everything but the functions is copied. */
+typedef struct rc_inclusion {
+    size_t size;                  /**< sizeof(rc_inclusion) */
+    size_t reactions;             /**< m, 1 to 4; the state has at most 8 components */
+    rc_smooth_fn smooth;          /**< required */
+    rc_reaction_bounds_fn bounds; /**< required */
+    rc_surface_fn offset;         /**< null: s = 0 */
+    const double* mass;           /**< A, n x n; null: the unit matrix */
+    const double* observe;        /**< E, m x n; null: the first m components */
+    const double* act;            /**< G, n x m; null: the transpose of E */
+    const size_t* stands_for;     /**< guard_count of them: the reaction that is asked where events
+                                     of a guard accumulate, press, or leave it on its surface with
+                                     y at rest, or RC_NO_REACTION; null: found for guards that are
+                                     a y */
+    const int32_t* in_modes;      /**< mode_count of them: 0 where a mode has no inclusion, and the
+                                     flow alone is followed; null: 1 for all */
+    rc_change_fn change;          /**< null: none */
+    rc_start_mode_fn start_mode;  /**< null: the mode stays */
+} rc_inclusion;
+
 /** Description of a system. Zero it, then set its size, dimension, flow and other members. */
 typedef struct rc_callbacks {
     size_t size;        /**< sizeof(rc_callbacks) */
@@ -195,6 +241,7 @@ typedef struct rc_callbacks {
     double time_event_period;       /**< [s] above 0: a clock that ticks at all times phase + k
                                        period, from the start to the end, both included */
     double time_event_phase;        /**< [s] */
+    const rc_inclusion* set_valued; /**< null: none. Not for monitors */
 } rc_callbacks;
 
 /** Ends the run at the event whose reset, or time_reset, returns the result of this call:
@@ -316,7 +363,11 @@ typedef enum rc_outcome_code {
     RC_TIME_EVENT_NOT_AHEAD = 13,
     RC_WRONG_DIMENSION = 14,
     RC_STALLED = 15,
-    RC_STOPPED_BY_CALLBACK = 16 /**< a callback failed; the run can be continued */
+    RC_STOPPED_BY_CALLBACK = 16, /**< a callback failed; the run can be continued */
+    /* Of systems with set_valued; 17 and 19 are never returned. */
+    RC_NOT_HANDED_OVER = 18, /**< no reaction within its bounds goes with y, see rc_reason */
+    RC_LAW_VIOLATED = 20,    /**< the flow contradicts the inclusion, see rc_reason */
+    RC_SEVERAL = 21          /**< several motions satisfy the law of a reaction, see rc_reason */
 } rc_outcome_code;
 
 /** Creates a run of `system` from x0, n doubles, which are copied, and evaluates the flow and the
@@ -383,9 +434,9 @@ RC_API rc_outcome_code rc_outcome(rc_simulation* simulation);
 RC_API const char* rc_outcome_name(rc_outcome_code outcome);
 /** One sentence about an outcome, with the remedy. */
 RC_API const char* rc_outcome_text(rc_outcome_code outcome);
-/** The text of rc_stop() that ended the run, or, of RC_NON_FINITE, which function was not finite;
- *  else empty, and for a handle that cannot be used. Valid until the next call that advances,
- * restores or frees the simulation. */
+/** The text of rc_stop() that ended the run, a sentence about the reactions that did, or, of
+ *  RC_NON_FINITE, which function was not finite; else empty, and for a handle that cannot be used.
+ * Valid until the next call that advances, restores or frees the simulation. */
 RC_API const char* rc_reason(rc_simulation* simulation);
 /** A sentence about the run so far: that about its outcome with the text of rc_stop(), and the
  *  guards that were armed beyond their surface. Valid until the next call with this simulation;
@@ -438,7 +489,10 @@ typedef enum rc_event_kind {
     RC_TOUCH = 1,        /**< the guard reached its surface and turned back */
     RC_TIME = 2,         /**< a time event */
     RC_ACCUMULATION = 3, /**< the limit of infinitely many events */
-    RC_MODE = 4,         /**< the flow lifts what the rest of the guard held */
+    RC_MODE = 4,         /**< the flow lifts what the rest of the guard held; of a reaction: it went
+                            from one of its bounds to the other */
+    RC_STICK = 5,        /**< a reaction at a bound began to hold */
+    RC_SLIP = 6,         /**< a reaction that held met a bound */
     RC_JUMP = 7          /**< the guard changed sign without a zero */
 } rc_event_kind;
 
@@ -457,12 +511,40 @@ typedef struct rc_event {
     double bracket_hi;    /**< [s] and has left it here */
     double slope;         /**< rate of the guard [1/s]; NaN if not computed */
     double error;         /**< [s] of location within the step, not of the solution */
+    size_t reaction;      /**< of a stick, a slip, a mode or a touch of a reaction, else
+                             RC_NO_REACTION */
 } rc_event;
 
 /** Number of events recorded so far; 0 for a handle that cannot be used. */
 RC_API size_t rc_event_count(rc_simulation* simulation);
 /** Event `index`, in the order of time. RC_INVALID if there is none. */
 RC_API rc_status rc_event_at(rc_simulation* simulation, size_t index, rc_event* event);
+
+/** Why a phase of a run began. */
+typedef enum rc_phase_cause {
+    RC_CAUSE_START = 0,
+    RC_CAUSE_NO_FLOW = 2,       /**< y' = 0 does not determine the held reactions */
+    RC_CAUSE_SEVERAL = 3,       /**< changes coincide, and rates do not tell what follows */
+    RC_CAUSE_ACCUMULATION = 4,  /**< infinitely many changes in finite time */
+    RC_CAUSE_CHATTERING = 5,    /**< more changes in a short time than are worth locating */
+    RC_CAUSE_STUCK = 6,         /**< steps by events could not go on */
+    RC_CAUSE_CONTRADICTION = 7, /**< a step by events contradicted the law of a reaction */
+    RC_CAUSE_RELEASED = 8,      /**< nothing is held any more */
+    RC_CAUSE_HELD = 9           /**< a y arrived at zero, and its reaction holds it */
+} rc_phase_cause;
+
+/** A part of a run of a system with set_valued, until the next one or the end. */
+typedef struct rc_phase {
+    size_t size;        /**< sizeof(rc_phase), filled in by the caller */
+    double from;        /**< [s] */
+    int32_t set_valued; /**< 1: something is held, or followed by implicit steps */
+    int32_t cause;      /**< an rc_phase_cause */
+} rc_phase;
+
+/** Number of phases so far; 0 without set_valued and for a handle that cannot be used. */
+RC_API size_t rc_phase_count(rc_simulation* simulation);
+/** Phase `index`, in the order of time. RC_INVALID if there is none. */
+RC_API rc_status rc_phase_at(rc_simulation* simulation, size_t index, rc_phase* phase);
 
 /** Number of samples taken so far, see `sample_times`; 0 for a handle that cannot be used. */
 RC_API size_t rc_sample_count(rc_simulation* simulation);

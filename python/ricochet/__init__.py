@@ -9,6 +9,7 @@ floating-point numbers.
 
 from ._compiled import (C_FLOW, C_GUARD, C_RATE, C_RESET, Compiled)
 from ._ensemble import Ensemble, ensemble, row_seed
+from ._inclusion import Inclusion
 from ._ivp import OdeResult, solve_ivp
 from ._monitor import Cut, Monitor, Verdict
 from ._network import Network
@@ -24,7 +25,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Certified", "Compiled",
-    "CoulombOscillator", "Cut", "Ensemble", "Guard", "ImpactOscillator", "Kind", "Monitor", "Network", "OdeResult",
+    "CoulombOscillator", "Cut", "Ensemble", "Guard", "ImpactOscillator", "Inclusion", "Kind", "Monitor", "Network", "OdeResult",
     "Pendulum", "Run", "Simulation", "Snapshot", "Solution", "StickSlip", "Stop", "System", "Thermostat",
     "Times", "Trained", "Verdict", "certify", "ensemble", "every", "guard", "integrate", "plot",
     "row_seed", "solve_ivp", "train_classifier", "train_gate",

@@ -73,6 +73,8 @@ class Run:
     def states(self) -> Floats: ...
     @property
     def solution(self) -> Optional[Solution]: ...
+    @property
+    def phases(self) -> list[Tuple[float, bool, str]]: ...
 
 class Snapshot:
     @property
@@ -107,6 +109,16 @@ class Guard:
 
 def guard(value: Optional[Callable[..., Any]] = None, **options: Any) -> Any: ...
 
+class Inclusion:
+    def __init__(
+        self, smooth: Callable[..., Any], bounds: Callable[..., Any], *,
+        observe: Optional[ArrayLike] = None, act: Optional[ArrayLike] = None,
+        mass: Optional[ArrayLike] = None, offset: Optional[Callable[..., Any]] = None,
+        offset_rate: Optional[Callable[..., Any]] = None, reactions: Optional[int] = None,
+        stands_for: Optional[Sequence[Optional[int]]] = None, in_modes: Optional[Sequence] = None,
+        change: Optional[Callable[..., Any]] = None,
+        start_mode: Optional[Callable[..., Any]] = None) -> None: ...
+
 class Stop(Exception):
     reason: str
     after: Any
@@ -126,6 +138,7 @@ class System:
     modes: Any
     name: Optional[str]
     time_events: Union[None, Times, Iterable[float]]
+    set_valued: Union[None, Inclusion, Callable[[], Inclusion]]
     changes_dimension: bool
     parameters: Optional[Mapping[str, float]]
     formula: Optional[int]
@@ -377,6 +390,7 @@ def solve_ivp(fun: Union[Callable[..., Any], Compiled, System, _Ready],
               t_span: Tuple[float, float], y0: ArrayLike, method: Any = "RK45",
               t_eval: Optional[ArrayLike] = None, dense_output: bool = False,
               events: Any = None, vectorized: bool = False, args: Optional[Sequence] = None, *,
+              set_valued: Optional[Inclusion] = None,
               rtol: ArrayLike = 1e-3, atol: ArrayLike = 1e-6, max_step: float = ...,
               first_step: Optional[float] = None, **options: Any) -> OdeResult: ...
 

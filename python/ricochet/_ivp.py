@@ -7,6 +7,7 @@ import numpy as np
 
 from . import _ricochet
 from ._compiled import Compiled
+from ._inclusion import specification_of
 from ._network import set_gate
 from ._ready import Ready
 from ._numbers import meant_by
@@ -104,7 +105,7 @@ class _Constant:
 
 
 def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, events=None,
-              vectorized=False, args=None, **options):
+              vectorized=False, args=None, *, set_valued=None, **options):
     """Solves y' = fun(t, y), y(t0) = y0, with events and resets.
 
     Arguments and result are those of ``scipy.integrate.solve_ivp``, and code that uses these runs
@@ -125,6 +126,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
       name : str
           for messages.
 
+    - ``set_valued`` is an `Inclusion`: friction, relays and stops, of which the motion becomes a part
+      where they hold something.
     - ``rtol`` is one number; of several numbers the smallest is used. ``atol`` may have one number
       for each component.
     - Further options are those of `integrate`, such as ``event_tolerance`` and ``max_steps``.
@@ -135,7 +138,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         With SciPy's ``t, y, sol, t_events, y_events, nfev, njev, nlu, status, message, success``;
         ``y_events`` are the states before resets. At a reset ``t`` holds its time twice where ``t_eval``
         is not given. New: ``y_events_after``, the states after; ``kinds``, for every event
-        'crossing', 'touch', 'jump', 'accumulation' or 'mode'; ``modes``, before and after; ``outcome``
+        'crossing', 'touch', 'jump', 'accumulation', 'mode' or, of a guard that stands for a reaction,
+        'stick'; ``modes``, before and after; ``phases`` of a system with ``set_valued``; ``outcome``
         and ``statistics``, whose ``evidence`` counts why steps were taken to hold no event.
 
     If ``fun`` or an event raises an exception, it is passed on unchanged, with the `Run` so far as
@@ -172,6 +176,9 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     if isinstance(fun, (System, Ready)):
         if events is not None:
             raise ValueError("events: found some beside a system, expected them as its guards")
+        if set_valued is not None:
+            raise ValueError("set_valued: found one beside a system, expected it as a member of the "
+                             "system")
         source, modes = source_of(fun, args)
         set_mode(given, fun, modes)
         count = source.guard_count
@@ -187,7 +194,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
                 return np.asarray(pointwise(t, y[:, None], *further)).ravel()
         modes = None
         source = _ricochet.callback_system(dict(
-            name="solve_ivp", flow=fun, flow_title="fun", args=args, guards=guards))
+            name="solve_ivp", flow=fun, flow_title="fun", args=args, guards=guards,
+            set_valued=specification_of(set_valued)))
     if t0 == t1:
         if not np.isfinite(t0):
             raise ValueError(f"t_span: found {t_span!r}, expected finite times")
@@ -363,7 +371,8 @@ def _result(run, count, dense_output, events_given):
                                          events["mode_after"][which]))
                         if run.modes else np.zeros((which.size, 2), np.uint32)
                         for which in chosen]
-    result.update(outcome=run.outcome, statistics=statistics, guard=run.guard, run=run)
+    result.update(outcome=run.outcome, statistics=statistics, guard=run.guard, phases=run.phases,
+                  run=run)
     return result
 
 
@@ -376,4 +385,5 @@ def _nothing(t, y, samples, dense_output, count):
                      y_events=no_events, nfev=0, njev=0, nlu=0, status=0,
                      message=_MESSAGES["reached_end"], success=True, y_events_after=no_events,
                      kinds=None if count is None else [[] for _ in range(count)],
-                     modes=no_events, outcome="reached_end", statistics=None, guard=None, run=None)
+                     modes=no_events, outcome="reached_end", statistics=None, guard=None, phases=[],
+                     run=None)

@@ -9,6 +9,7 @@ from types import MethodType
 from . import _ricochet
 from ._compiled import Compiled
 from ._formula import Formula
+from ._inclusion import specification_of
 from ._numbers import meant_by, number_from
 
 #: The largest number of events after which a guard can end the run.
@@ -211,7 +212,8 @@ def guard(value=None, **options):
 
 _KNOWN = ("flow", "guard", "reset", "rest", "guard_rate", "unilateral", "direction", "modes",
           "name", "guards", "guard_values", "reset_set", "time_events", "next_time_event",
-          "previous_time_event", "time_reset", "changes_dimension", "parameters", "formula")
+          "previous_time_event", "time_reset", "changes_dimension", "parameters", "formula",
+          "set_valued")
 
 
 def _plain_guard(function, index):
@@ -307,6 +309,9 @@ class System:
         once with symbols, in each mode, and then computed without Python, also by
         ``method="taylor"``. They use arithmetic and functions of NumPy (np.sin, ...). Apart from
         the mode, they must not compare their arguments or branch on them.
+    set_valued
+        An `Inclusion`: friction, relays and stops, of which the motion becomes a part where they
+        hold something; or a method that returns one.
     name, parameters
         Identification for networks: a text, and a dictionary of numbers.
     """
@@ -324,6 +329,7 @@ class System:
     changes_dimension = False
     parameters = None
     formula = None
+    set_valued = None
     _unchecked_names = False
 
     def __init__(self, flow=None, guards=None, **members):
@@ -499,7 +505,8 @@ class System:
             guard_values=self.guard_values, reset_set=self.reset_set,
             time_events=times, next_time_event=None if at else following,
             next_time_event_at=following if at else None, previous_time_event=preceding,
-            time_reset=self.time_reset, changes_dimension=self.changes_dimension))
+            time_reset=self.time_reset, changes_dimension=self.changes_dimension,
+            set_valued=specification_of(self.set_valued)))
         if self.parameters is not None:
             source.parameters = {name.replace("_", "-"): float(value)
                                  for name, value in dict(self.parameters).items()}

@@ -22,6 +22,7 @@ void Loop<X, single>::review_phase(bool has_advanced)
         if (verdict.kind == PhaseVerdict::Kind::stands) break;
         if (verdict.kind == PhaseVerdict::Kind::ends) {
             end(verdict.outcome);
+            run_.reason = phases_->reason(system_.door());
             break;
         }
         continue_from(x, verdict.mode, verdict.h);

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "ricochet/detail/step_state.hpp"
@@ -103,6 +104,8 @@ struct PhaseTable {
     PhaseVerdict (*review)(Door, const PhaseStep<X>&, X& x) = nullptr;
     /// The phase where the run would end. May move x onto a surface.
     PhaseVerdict (*give_up)(Door, const PhaseEnd<X>&, X& x) = nullptr;
+    /// A sentence about the end that the phases have given to the run, or an empty one.
+    std::string_view (*reason)(Door) = nullptr;
     /// The numbers besides time, mode and state on which the future of the run depends.
     void (*save)(Door, std::vector<double>& memory) = nullptr;
     void (*restore)(Door, const std::vector<double>& memory) = nullptr;

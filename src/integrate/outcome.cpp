@@ -39,6 +39,7 @@ std::string_view name(Outcome outcome) noexcept
         case Outcome::not_handed_over: return "not_handed_over";
         case Outcome::released: return "released";
         case Outcome::law_violated: return "law_violated";
+        case Outcome::several: return "several";
         case Outcome::running: return "running";
     }
     return "unknown";
@@ -105,6 +106,9 @@ std::string_view describe(Outcome outcome) noexcept
         case Outcome::law_violated:
             return "a step ended with a reaction that contradicts its law; check reaction_set, "
                    "or take shorter steps";
+        case Outcome::several:
+            return "several motions satisfy the law of the reactions here, and nothing says which "
+                   "one follows; start beside it, or check the signs of observe and act";
         case Outcome::running: return "the run has not ended";
     }
     return "unknown outcome";
@@ -135,7 +139,8 @@ std::string describe(const Statistics& statistics, std::span<const std::string> 
 
 std::string detail::describe_reason(Outcome outcome, const std::string& reason)
 {
-    if (outcome != Outcome::non_finite) return "a reset ended the run: " + reason;
+    if (outcome == Outcome::stopped_by_event) return "a reset ended the run: " + reason;
+    if (outcome != Outcome::non_finite) return std::string(describe(outcome)) + ": " + reason;
     return reason +
            " returned NaN or infinity, or led to a state that is not finite; the last finite state "
            "is kept";

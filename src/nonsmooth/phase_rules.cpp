@@ -4,6 +4,8 @@
 #include <cstring>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "ricochet/detail/event_loop.hpp"
 
 namespace ricochet::detail {
@@ -17,21 +19,32 @@ constexpr double most_events = 200, most_flutters = 400;
 
 }  // namespace
 
-void PhaseRules::watch(const double* x0, std::span<const std::size_t> stands_for)
+PhaseRules::PhaseRules(const BranchPhases& any, bool by_mode, const PhaseOptions& options)
+    : any_(any),
+      branch_modes_(any.branch_modes()),
+      count_(any.reactions()),
+      size_(any.size()),
+      by_mode_(by_mode),
+      options_(options)
 {
     for (auto* numbers : {&sides_, &y_, &y_before_, &lower_, &upper_, &rates_}) {
-        numbers->assign(count(), 0);
+        numbers->assign(count_, 0);
     }
-    flow_.assign(inclusion_.size(), 0);
-    arrived_.assign(count(), false);
-    watched_.assign(count(), false);
-    branch_guards_.assign(BranchPhases::guards_of_reaction * count(), 1);
-    inclusion_.bounds(options_.t_start, x0, lower_.data(), upper_.data());
+    flow_.assign(size_, 0);
+    arrived_.assign(count_, false);
+    branch_guards_.assign(BranchPhases::guards_of_reaction * count_, 1);
+}
+
+void PhaseRules::choose_watched(ModeInclusion& of, const double* x0)
+{
+    of.watched.assign(count(), by_mode_);
+    if (by_mode_ || !of.inclusion) return;
+    of.inclusion->bounds(options_.t_start, x0, lower_.data(), upper_.data());
     for (std::size_t i = 0; i < count(); ++i) {
-        watched_[i] = std::isfinite(lower_[i]) && std::isfinite(upper_[i]);
+        of.watched[i] = std::isfinite(lower_[i]) && std::isfinite(upper_[i]);
     }
-    for (const std::size_t reaction : stands_for) {
-        if (reaction != no_reaction) watched_[reaction] = true;
+    for (const std::size_t reaction : of.stands_for) {
+        if (reaction != no_reaction) of.watched[reaction] = true;
     }
 }
 
@@ -40,11 +53,11 @@ void PhaseRules::watch(const double* x0, std::span<const std::size_t> stands_for
 void PhaseRules::flow(Kind kind, double t, const double* x, double* dxdt)
 {
     if (is_explicit(kind)) {
-        inclusion_.flow(branches_of(kind), t, x, dxdt);
+        inclusion().flow(branches_of(kind), t, x, dxdt);
     } else if (is_implicit(kind)) {
-        inclusion_.selected_rate(t, x, dxdt);
+        inclusion().selected_rate(t, x, dxdt);
     } else {
-        std::fill_n(dxdt, inclusion_.size(), 0.0);
+        std::fill_n(dxdt, size_, 0.0);
     }
 }
 
@@ -53,14 +66,14 @@ double PhaseRules::fraction_of_held(Kind kind, double t0, const double* x0, doub
 {
     // Below that length the motion has no smoothness that steps could follow.
     if (t1 - t0 <= 1e-9 * (options_.t_end - options_.t_start)) return 1;
-    const double fraction = inclusion_.fraction_of_held(branches_of(kind), t0, x0, t1, x1);
+    const double fraction = inclusion().fraction_of_held(branches_of(kind), t0, x0, t1, x1);
     memory_.contradicts = fraction > 0 ? 0 : 1;
     return fraction > 0 ? fraction : 0.1;
 }
 
 GuardInfo PhaseRules::guard_info(std::size_t which) const
 {
-    if (!watches_own(which)) return inclusion_.guard_info(in_branches(which));
+    if (!watches_own(which)) return any_.guard_info(in_branches(which));
     GuardInfo info;
     info.name = "y arrives at zero";
     info.crossing = Crossing::either;
@@ -69,28 +82,31 @@ GuardInfo PhaseRules::guard_info(std::size_t which) const
 
 bool PhaseRules::enabled(std::size_t which, Kind kind) const
 {
-    if (watches_own(which)) return kind == own && watched_[reaction_of(which)];
-    return is_explicit(kind) && inclusion_.enabled(in_branches(which), branches_of(kind));
+    if (!has_inclusion()) return false;
+    if (watches_own(which)) return kind == own && now_->watched[reaction_of(which)];
+    return is_explicit(kind) && inclusion().enabled(in_branches(which), branches_of(kind));
 }
 
 double PhaseRules::guard(std::size_t which, Kind kind, double t, const double* x) const
 {
+    if (!has_inclusion()) return 1;
     // -y, kind 1, does not depend on the branches.
-    if (watches_own(which)) return -inclusion_.guard(in_branches(which) - 4, 0, t, x);
-    return is_explicit(kind) ? inclusion_.guard(in_branches(which), branches_of(kind), t, x) : 1;
+    if (watches_own(which)) return -inclusion().guard(in_branches(which) - 4, 0, t, x);
+    return is_explicit(kind) ? inclusion().guard(in_branches(which), branches_of(kind), t, x) : 1;
 }
 
 void PhaseRules::guards(Kind kind, double t, const double* x, std::span<double> g) const
 {
     std::fill(g.begin(), g.end(), 1.0);
+    if (!has_inclusion()) return;
     constexpr std::size_t from = BranchPhases::guards_of_reaction;
     if (is_explicit(kind)) {
-        inclusion_.guards(branches_of(kind), t, x, branch_guards_.data());
+        inclusion().guards(branches_of(kind), t, x, branch_guards_.data());
         for (std::size_t i = 0; i < count(); ++i) {
             std::copy_n(branch_guards_.data() + from * i, from, g.data() + guards_of_reaction * i);
         }
     } else if (kind == own) {
-        inclusion_.observe(t, x, branch_guards_.data());
+        inclusion().observe(t, x, branch_guards_.data());
         for (std::size_t i = 0; i < count(); ++i) {
             g[guards_of_reaction * i + from] = branch_guards_[i];
         }
@@ -100,9 +116,10 @@ void PhaseRules::guards(Kind kind, double t, const double* x, std::span<double> 
 double PhaseRules::guard_rate(std::size_t which, Kind kind, double t, const double* x,
                               const double* dxdt) const
 {
-    if (watches_own(which)) return -inclusion_.guard_rate(in_branches(which) - 4, 0, t, x, dxdt);
+    if (!has_inclusion()) return 0;
+    if (watches_own(which)) return -inclusion().guard_rate(in_branches(which) - 4, 0, t, x, dxdt);
     return is_explicit(kind)
-               ? inclusion_.guard_rate(in_branches(which), branches_of(kind), t, x, dxdt)
+               ? inclusion().guard_rate(in_branches(which), branches_of(kind), t, x, dxdt)
                : 0;
 }
 
@@ -110,16 +127,17 @@ void PhaseRules::guard_rates(Kind kind, double t, const double* x, const double*
                              std::span<double> rates) const
 {
     std::fill(rates.begin(), rates.end(), 0.0);
+    if (!has_inclusion()) return;
     constexpr std::size_t from = BranchPhases::guards_of_reaction;
     if (is_explicit(kind)) {
-        inclusion_.guard_rates(branches_of(kind), t, x, dxdt, branch_guards_.data());
+        inclusion().guard_rates(branches_of(kind), t, x, dxdt, branch_guards_.data());
         for (std::size_t i = 0; i < count(); ++i) {
             std::copy_n(branch_guards_.data() + from * i, from,
                         rates.data() + guards_of_reaction * i);
         }
     } else if (kind == own) {
         for (std::size_t i = 0; i < count(); ++i) {
-            if (!watched_[i]) continue;
+            if (!now_->watched[i]) continue;
             const std::size_t which = guards_of_reaction * i + from;
             rates[which] = guard_rate(which, kind, t, x, dxdt);
         }
@@ -130,7 +148,7 @@ void PhaseRules::guard_rates(Kind kind, double t, const double* x, const double*
 
 bool PhaseRules::are_clear(Mode b, double t, const double* x)
 {
-    inclusion_.observe(t, x, y_.data());
+    inclusion().observe(t, x, y_.data());
     for (std::size_t i = 0; i < count(); ++i) {
         if (BranchPhases::branch(i, b) != Branch::inside && !is_clear(i, y_[i], x)) return false;
     }
@@ -139,22 +157,29 @@ bool PhaseRules::are_clear(Mode b, double t, const double* x)
 
 bool PhaseRules::is_near_surface(double t, const double* x)
 {
-    inclusion_.observe(t, x, y_.data());
+    inclusion().observe(t, x, y_.data());
     for (std::size_t i = 0; i < count(); ++i) {
         if (std::fabs(y_[i]) <= 1e3 * resolution(i, x)) return true;
     }
     return false;
 }
 
-bool PhaseRules::has_finite_bounds(Mode at, double t, const double* x)
+std::size_t PhaseRules::unbounded(Mode at, double t, const double* x)
 {
-    inclusion_.bounds(t, x, lower_.data(), upper_.data());
+    inclusion().bounds(t, x, lower_.data(), upper_.data());
     for (std::size_t i = 0; i < count(); ++i) {
         const Branch branch = BranchPhases::branch(i, at);
-        if (branch == Branch::lower && std::isinf(lower_[i])) return false;
-        if (branch == Branch::upper && std::isinf(upper_[i])) return false;
+        if (branch == Branch::lower && std::isinf(lower_[i])) return i;
+        if (branch == Branch::upper && std::isinf(upper_[i])) return i;
     }
-    return true;
+    return no_reaction;
+}
+
+std::string PhaseRules::sentence_of_unbounded(std::size_t i) const
+{
+    const std::string where = by_mode_ ? fmt::format("in mode {} ", now_->mode) : std::string();
+    return fmt::format("{}y of reaction {} is {}, where the reaction has no bound", where, i,
+                       y_[i]);
 }
 
 // --- entering ---
@@ -162,29 +187,76 @@ bool PhaseRules::has_finite_bounds(Mode at, double t, const double* x)
 Kind PhaseRules::enter(double t, double* x)
 {
     memory_ = {};
+    reason_.clear();
     changes_.clear();
     phases_.clear();
-    bool clear = true;
-    inclusion_.check_bounds(t, x);
-    inclusion_.observe(t, x, y_.data());
-    for (std::size_t i = 0; i < count(); ++i) {
-        clear = clear && (!watched_[i] || is_clear(i, y_[i], x));
+    Kind kind = own;
+    if (has_inclusion()) inclusion().check_bounds(t, x);
+    if (has_inclusion() && !goes_by_itself(t, x)) {
+        const Mode at = inclusion().signs(t, x);
+        if (const std::size_t i = unbounded(at, t, x); by_mode_ && i != no_reaction) {
+            throw InclusionRefused("integrate: at the start " + sentence_of_unbounded(i));
+        }
+        const Mode b = inclusion().start(t, x);
+        kind = determined_kind(at, b, t, x, PhaseCause::start);
     }
-    const Kind kind = clear ? own : kind_for(inclusion_.start(t, x), t, x, PhaseCause::start);
     note_sides(t, x);
     note(kind, t, PhaseCause::start);
     begins_ = true;
     return kind;
 }
 
+Kind PhaseRules::enter_mode(Kind before, double t, double* x)
+{
+    if (before == over()) return over();
+    reason_.clear();
+    Kind kind = own;
+    cause_ = PhaseCause::held;
+    if (has_inclusion() && !goes_by_itself(t, x)) {
+        kind = settle(inclusion().signs(t, x), t, x, PhaseCause::held);
+    }
+    if (kind != before && kind != over()) note(kind, t, cause_);
+    note_sides(t, x);
+    return kind;
+}
+
+bool PhaseRules::goes_by_itself(double t, const double* x)
+{
+    inclusion().observe(t, x, y_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (now_->watched[i] && !is_clear(i, y_[i], x)) return false;
+    }
+    // No motion contradicts the inclusion of its own mode.
+    return !by_mode_ || has_finite_bounds(inclusion().signs(t, x), t, x);
+}
+
+Kind PhaseRules::settle(Mode at, double t, double* x, PhaseCause cause)
+{
+    if (const std::size_t i = unbounded(at, t, x); i != no_reaction) {
+        reason_ = sentence_of_unbounded(i);
+        return end_with(Outcome::not_handed_over);
+    }
+    const Mode b = inclusion().arrive(at, t, x);
+    return determined_kind(at, b, t, x, cause);
+}
+
+Kind PhaseRules::determined_kind(Mode at, Mode b, double t, const double* x, PhaseCause cause)
+{
+    const std::size_t i = inclusion().undetermined(at, t, x);
+    if (i == no_reaction) return kind_for(b, t, x, cause);
+    reason_ = fmt::format(
+        "where its y is zero, reaction {} may hold it or let it leave to either side", i);
+    return end_with(Outcome::several);
+}
+
 Kind PhaseRules::kind_for(Mode b, double t, const double* x, PhaseCause cause)
 {
-    const Mode several = inclusion_.branch_modes();
+    const Mode several = branch_modes_;
     cause_ = cause;
     if (b < several) return explicit_in(b);
     if (b == several) return go_by_steps(PhaseCause::several, t, x);
     if (b == several + 1) return go_by_steps(PhaseCause::no_flow, t, x);
-    inclusion_.note_faulty(t, x);
+    inclusion().note_faulty(t, x);
     return end_with(Outcome::not_converged);
 }
 
@@ -201,22 +273,30 @@ Kind PhaseRules::go_by_steps(PhaseCause cause, double t, const double* x)
     memory_.steps = 0;
     cause_ = cause;
     Mode b = 0;
-    if (inclusion_.keeps_to_branches()) return end_with(Outcome::not_handed_over);
-    if (!inclusion_.select(t, x, b)) return end_with(Outcome::not_converged);
+    if (inclusion().keeps_to_branches()) return end_with(Outcome::not_handed_over);
+    if (!inclusion().select(t, x, b)) return end_with(Outcome::not_converged);
     memory_.across = b;
     return chatters ? across() : implicit_in(b);
 }
 
 // --- sets ---
 
-Kind PhaseRules::decide(const Set& set, double* x)
+void PhaseRules::forget_changes()
 {
     changes_.clear();
     std::fill(arrived_.begin(), arrived_.end(), false);
+}
+
+Kind PhaseRules::decide(const Set& set, double* x)
+{
+    forget_changes();
     if (set.kind == over()) return over();
-    inclusion_.observe(set.t, set.before, y_before_.data());
-    inclusion_.observe(set.t, x, y_.data());
+    reason_.clear();
+    if (!has_inclusion()) return own;
+    inclusion().observe(set.t, set.before, y_before_.data());
+    inclusion().observe(set.t, x, y_.data());
     cause_ = PhaseCause::held;
+    sides_before_ = sides_;
     const Mode before = branches_before(set);
     const bool was_own = has_own_guards(set.kind);
     const Kind next = was_own                 ? decide_own(set, x)
@@ -234,30 +314,34 @@ Kind PhaseRules::decide(const Set& set, double* x)
 
 Kind PhaseRules::decide_own(const Set& set, double* x)
 {
-    Mode at = inclusion_.signs(set.t, x);
+    Mode at = inclusion().signs(set.t, x);
     bool asks = false;
     for (const Fired& fired : set.fired) {
         const bool of_set = fired.which != no_guard && kind_of_guard(fired.which) == 4;
-        if (of_set) return kind_for(inclusion_.branch_modes() + 2, set.t, x, cause_);
+        if (of_set) return kind_for(branch_modes_ + 2, set.t, x, cause_);
+        if (fired.asks != no_reaction) {
+            asks = asks || BranchPhases::branch(fired.asks, at) == Branch::inside;
+            continue;
+        }
         const std::size_t i = fired.which != no_guard ? reaction_of(fired.which) : fired.reaction;
         if (y_[i] != y_before_[i]) continue;  // a reset has moved it on
         arrived_[i] = asks = true;
         at = BranchPhases::with_branch(i, Branch::inside, at);
     }
     for (std::size_t i = 0; i < count(); ++i) {
-        asks = asks || (watched_[i] && !is_clear(i, y_[i], x));
+        asks = asks || (now_->watched[i] && !is_clear(i, y_[i], x));
     }
+    const bool moves = !std::equal(x, x + size_, set.before);
+    if (by_mode_ && moves && !has_finite_bounds(at, set.t, x)) asks = true;
     if (!asks) {
-        const bool moves = !std::equal(x, x + inclusion_.size(), set.before);
         return moves ? own : set.kind;
     }
-    if (!has_finite_bounds(at, set.t, x)) return end_with(Outcome::not_handed_over);
-    return kind_for(inclusion_.arrive(at, set.t, x), set.t, x, PhaseCause::held);
+    return settle(at, set.t, x, PhaseCause::held);
 }
 
 Mode PhaseRules::branches_after(Mode b, double t, const double* x)
 {
-    const Mode signs = inclusion_.signs(t, x);
+    const Mode signs = inclusion().signs(t, x);
     for (std::size_t i = 0; i < count(); ++i) {
         const Branch sign = BranchPhases::branch(i, signs);
         if (y_[i] == y_before_[i] || sign == Branch::inside) continue;
@@ -269,7 +353,7 @@ Mode PhaseRules::branches_after(Mode b, double t, const double* x)
 Kind PhaseRules::decide_explicit(const Set& set, double* x)
 {
     const double t = set.t;
-    const bool moves = !std::equal(x, x + inclusion_.size(), set.before);
+    const bool moves = !std::equal(x, x + size_, set.before);
     const Mode b = branches_of(set.kind);
     const Mode from = moves ? branches_after(b, t, x) : b;
     kept_.clear();
@@ -281,45 +365,52 @@ Kind PhaseRules::decide_explicit(const Set& set, double* x)
         kept_.push_back(in_branches(fired.which));
         ++memory_.events;
     }
-    if (!kept_.empty()) return kind_for(inclusion_.reset(kept_, from, t, x), t, x, cause_);
+    if (!kept_.empty()) {
+        Mode at = from;
+        for (std::size_t i = 0; i < count(); ++i) {
+            if (arrived_[i]) at = BranchPhases::with_branch(i, Branch::inside, at);
+        }
+        const Mode b = inclusion().reset(kept_, from, t, x);
+        return determined_kind(at, b, t, x, cause_);
+    }
     // Loads may have jumped, and a reset may have set a y to zero.
     bool asks =
-        (moves || set.on_time) && inclusion_.holds(from) && !inclusion_.stays_held(from, t, x);
+        (moves || set.on_time) && inclusion().holds(from) && !inclusion().stays_held(from, t, x);
     Mode at = from;
-    const Mode signs = inclusion_.signs(t, x);
+    const Mode signs = inclusion().signs(t, x);
     for (std::size_t i = 0; i < count(); ++i) {
         if (BranchPhases::branch(i, signs) != Branch::inside) continue;
         if (y_[i] == y_before_[i]) continue;
         at = BranchPhases::with_branch(i, Branch::inside, at);
         asks = asks || BranchPhases::branch(i, from) != Branch::inside;
     }
+    if (!asks && from != b && !has_finite_bounds(from, t, x)) asks = true;
     if (!asks) return explicit_in(from);
-    if (!has_finite_bounds(at, t, x)) return end_with(Outcome::not_handed_over);
-    return kind_for(inclusion_.arrive(at, t, x), t, x, cause_);
+    return settle(at, t, x, cause_);
 }
 
 Kind PhaseRules::decide_implicit(const Set& set, double* x)
 {
-    const bool moves = !std::equal(x, x + inclusion_.size(), set.before);
+    const bool moves = !std::equal(x, x + size_, set.before);
     if (set.on_change && !moves) {
-        const Mode b = inclusion_.change(branches_of(set.kind), set.t, x);
-        arrived_[inclusion_.changed()] = true;
+        const Mode b = inclusion().change(branches_of(set.kind), set.t, x);
+        arrived_[inclusion().changed()] = true;
         memory_.changed_at = set.t;
         memory_.steps = 0;
         return implicit_in(b);
     }
-    if (!moves && !(set.on_time && inclusion_.jumps(set.t, x))) return set.kind;
+    if (!moves && !(set.on_time && inclusion().jumps(set.t, x))) return set.kind;
     Mode b = branches_before(set);
     // A y that the set has left alone is as much at zero as it was, but for the rounding of steps.
     double size = 0;
-    for (std::size_t c = 0; c < inclusion_.size(); ++c) size = std::fmax(size, std::fabs(x[c]));
+    for (std::size_t c = 0; c < size_; ++c) size = std::fmax(size, std::fabs(x[c]));
     for (std::size_t i = 0; i < count(); ++i) {
         const bool is_held = BranchPhases::branch(i, b) == Branch::inside;
         const bool stays = y_[i] == y_before_[i] && (is_held || std::fabs(y_[i]) <= 1e-14 * size);
         b = BranchPhases::with_branch(i, stays ? Branch::inside : Branch::lower, b);
     }
-    inclusion_.hold(b, set.t, x);
-    if (!inclusion_.select(set.t, x, b)) return end_with(Outcome::not_converged);
+    inclusion().hold(b, set.t, x);
+    if (!inclusion().select(set.t, x, b)) return end_with(Outcome::not_converged);
     memory_.across = b;
     return set.kind == across() ? across() : implicit_in(b);
 }
@@ -336,12 +427,62 @@ Mode PhaseRules::branches_before(const Set& set) const
     return b;
 }
 
-void PhaseRules::note_changes(const Set& set, Mode before, Kind next, const double* /*x*/)
+bool PhaseRules::step_back(double t, double* x)
 {
+    inclusion().observe(t, x, y_before_.data());
+    bool any = false;
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (!arrived_[i]) continue;
+        any = true;
+        inclusion().shift(i, sides_before_[i] * resolution(i, x) - y_before_[i], x);
+    }
+    inclusion().observe(t, x, y_before_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (arrived_[i] && !(y_before_[i] * sides_before_[i] > 0)) return false;
+    }
+    return any;
+}
+
+bool PhaseRules::is_flow(double t, const double* x, const double* rate)
+{
+    Mode b = 0;
+    inclusion().observe(t, x, y_before_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        const Branch side = y_before_[i] >= 0 ? Branch::lower : Branch::upper;
+        b = BranchPhases::with_branch(i, side, b);
+    }
+    if (!has_finite_bounds(b, t, x)) return true;
+    inclusion().flow(b, t, x, flow_.data());
+    std::size_t off = 0;
+    double largest = 0, size = 0;
+    for (std::size_t c = 0; c < size_; ++c) {
+        const double difference = std::fabs(flow_[c] - rate[c]);
+        if (!(difference <= largest)) largest = difference, off = c;
+        size = std::max({size, std::fabs(flow_[c]), std::fabs(rate[c])});
+    }
+    const double there = flow_[off];
+    // A rate is the difference of terms that may be larger: that of the other bounds tells how far.
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (!arrived_[i] || !has_finite_bounds(other_side(i, b), t, x)) continue;
+        inclusion().flow(other_side(i, b), t, x, flow_.data());
+        for (const double component : flow_) size = std::fmax(size, std::fabs(component));
+    }
+    if (largest <= 1e-6 * size) return true;
+    reason_ = fmt::format(
+        "where a y arrives at zero, at t = {}, the flow gives component {} the rate {}, and the "
+        "inclusion {}",
+        t, off, rate[off], there);
+    return false;
+}
+
+void PhaseRules::note_changes(const Set& set, Mode before, Kind next, const double* x)
+{
+    inclusion().bounds(set.t, x, lower_.data(), upper_.data());
     const Mode after = next == across() ? static_cast<Mode>(memory_.across) : branches_of(next);
     for (std::size_t i = 0; i < count(); ++i) {
         const Branch from = BranchPhases::branch(i, before);
         const Branch to = BranchPhases::branch(i, after);
+        if (from != Branch::inside && lower_[i] == upper_[i]) continue;  // it has one value
         ReactionChange change{.reaction = i};
         if (from == Branch::inside && to != Branch::inside) {
             change.kind = EventKind::slip;
@@ -380,9 +521,9 @@ void PhaseRules::note_flutter(const Set& set, Kind next, const double* x)
         const std::size_t i = reaction_of(fired.which);
         double speed = std::numeric_limits<double>::infinity();
         if (kind_of_guard(fired.which) < 2 && is_explicit(next)) {
-            std::vector<double> rate(inclusion_.size());
-            inclusion_.flow(branches_of(next), set.t, x, rate.data());
-            speed = std::fabs(inclusion_.rate_of(i, rate.data()));
+            std::vector<double> rate(size_);
+            inclusion().flow(branches_of(next), set.t, x, rate.data());
+            speed = std::fabs(inclusion().rate_of(i, rate.data()));
         }
         // The largest |y| is that of a parabola between two zeros.
         const bool flutters = speed * (set.t - memory_.fluttered_at) / 4 <= resolution(i, x);
@@ -393,7 +534,8 @@ void PhaseRules::note_flutter(const Set& set, Kind next, const double* x)
 
 void PhaseRules::note_sides(double t, const double* x)
 {
-    inclusion_.observe(t, x, y_.data());
+    if (!has_inclusion()) return;
+    inclusion().observe(t, x, y_.data());
     for (std::size_t i = 0; i < count(); ++i) {
         if (y_[i] != 0) sides_[i] = std::copysign(1.0, y_[i]);
     }
@@ -435,9 +577,10 @@ PhaseRules::Verdict PhaseRules::review(const Step& step, double* x)
     if (step.kind == over()) {
         return {PhaseVerdict::Kind::ends, step.kind, 0, static_cast<Outcome>(memory_.outcome)};
     }
-    note_sides(step.t, x);
     // The first step of a run is that of its flow, which says nothing of implicit steps.
     const bool begins = std::exchange(begins_, false);
+    if (!has_inclusion()) return {};
+    note_sides(step.t, x);
     if (begins && is_implicit(step.kind)) {
         return {PhaseVerdict::Kind::changes, step.kind, options_.step};
     }
@@ -448,9 +591,9 @@ PhaseRules::Verdict PhaseRules::review(const Step& step, double* x)
 
 bool PhaseRules::may_arrive(const Step& step, double reach)
 {
-    inclusion_.observe_rate(step.t, step.rate, rates_.data());
+    inclusion().observe_rate(step.t, step.rate, rates_.data());
     for (std::size_t i = 0; i < count(); ++i) {
-        if (!watched_[i] || !(y_[i] * rates_[i] < 0)) continue;
+        if (!now_->watched[i] || !(y_[i] * rates_[i] < 0)) continue;
         if (std::fabs(y_[i]) <= reach * std::fabs(rates_[i])) return true;
     }
     return false;
@@ -458,7 +601,7 @@ bool PhaseRules::may_arrive(const Step& step, double reach)
 
 bool PhaseRules::is_flow_of(Mode b, const Step& step, const double* x)
 {
-    inclusion_.flow(b, step.t, x, flow_.data());
+    inclusion().flow(b, step.t, x, flow_.data());
     double size = 0, off = 0;
     for (std::size_t c = 0; c < flow_.size(); ++c) {
         size = std::fmax(size, std::fabs(step.rate[c]));
@@ -477,8 +620,8 @@ PhaseRules::Verdict PhaseRules::review_own(const Step& step, const double* x)
         return change_to(own, step.t, PhaseCause::released, -1);
     }
     if (!may_arrive(step, 2 * step.h_next)) return {};
-    const Mode b = inclusion_.signs(step.t, x);
-    const bool plain = !inclusion_.holds(b) && has_finite_bounds(b, step.t, x);
+    const Mode b = inclusion().signs(step.t, x);
+    const bool plain = !inclusion().holds(b) && has_finite_bounds(b, step.t, x);
     if (!plain || !is_flow_of(b, step, x)) return {};
     return change_to(approach_in(b), step.t, PhaseCause::released, -1);
 }
@@ -506,10 +649,10 @@ PhaseRules::Verdict PhaseRules::review_explicit(Kind kind, double t, double* x)
         return change_to(go_by_steps(cause, t, x), t, cause, options_.step);
     };
     if (contradicts) return by_steps(PhaseCause::contradiction);
-    if (!inclusion_.holds(b) && are_clear(b, t, x)) return release(t);
+    if (!inclusion().holds(b) && are_clear(b, t, x)) return release(t);
     if (chatters(t)) return by_steps(PhaseCause::chattering);
     if (memory_.fluttering > most_flutters) {
-        inclusion_.hold(inclusion_.signs(t, x), t, x);
+        inclusion().hold(inclusion().signs(t, x), t, x);
         return by_steps(PhaseCause::accumulation);
     }
     return {};
@@ -520,23 +663,23 @@ PhaseRules::Verdict PhaseRules::review_implicit(Kind kind, double t, bool has_ad
     if (has_advanced) {
         ++memory_.steps;
         ++implicit_steps_;
-        if (inclusion_.law() > 1e-6) {
+        if (inclusion().law() > 1e-6) {
             return {PhaseVerdict::Kind::ends, kind, 0, Outcome::law_violated};
         }
     }
     Mode b = branches_of(kind);
     if (kind == across()) {
-        b = inclusion_.branches_at_end();
+        b = inclusion().branches_at_end();
         // Changes that are not located restart the count.
         if (b != static_cast<Mode>(memory_.across)) memory_.steps = 0;
         memory_.across = b;
     }
-    if (!inclusion_.holds(b) && are_clear(b, t, x)) return release(t);
-    if (memory_.steps < memory_.patience || !inclusion_.flows(b)) return {};
+    if (!inclusion().holds(b) && are_clear(b, t, x)) return release(t);
+    if (memory_.steps < memory_.patience || !inclusion().flows(b)) return {};
     // The branch of a y that has just left zero tells its direction, so its size is not tested.
     Mode tested = b;
     if (memory_.changed_at == t) {
-        tested = BranchPhases::with_branch(inclusion_.changed(), Branch::inside, b);
+        tested = BranchPhases::with_branch(inclusion().changed(), Branch::inside, b);
     }
     if (!are_clear(tested, t, x)) return {};
     for (std::size_t i = 0; i < count(); ++i) {
@@ -544,11 +687,11 @@ PhaseRules::Verdict PhaseRules::review_implicit(Kind kind, double t, bool has_ad
         const bool wrong = branch == Branch::lower ? y_[i] < 0 : y_[i] > 0;
         if (wrong) b = BranchPhases::with_branch(i, Branch::inside, b);
     }
-    std::vector<double> held(x, x + inclusion_.size());
-    inclusion_.hold(b, t, held.data());
+    std::vector<double> held(x, x + size_);
+    inclusion().hold(b, t, held.data());
     try {
-        const Mode next = inclusion_.start(t, held.data());
-        if (next >= inclusion_.branch_modes()) return {};
+        const Mode next = inclusion().start(t, held.data());
+        if (next >= branch_modes_) return {};
         std::copy(held.begin(), held.end(), x);
         return change_to(explicit_in(next), t, PhaseCause::released);
     } catch (const InclusionRefused&) {
@@ -556,8 +699,21 @@ PhaseRules::Verdict PhaseRules::review_implicit(Kind kind, double t, bool has_ad
     }
 }
 
+PhaseRules::Verdict PhaseRules::ask(const End& end, double* x, PhaseCause cause)
+{
+    const std::size_t i = end.reaction;
+    const Mode b = branches_of(end.kind);
+    if (i == no_reaction || BranchPhases::branch(i, b) == Branch::inside) return {};
+    inclusion().observe(end.t, x, y_.data());
+    if (is_clear(i, y_[i], x)) return {};
+    const Mode at = BranchPhases::with_branch(i, Branch::inside, b);
+    if (!has_finite_bounds(at, end.t, x)) return {};
+    return change_to(settle(at, end.t, x, cause), end.t, cause);
+}
+
 PhaseRules::Verdict PhaseRules::give_up(const End& end, double* x)
 {
+    reason_.clear();
     if (is_implicit(end.kind)) {
         const bool unsolved =
             end.outcome == Outcome::non_finite || end.outcome == Outcome::step_underflow;
@@ -566,26 +722,33 @@ PhaseRules::Verdict PhaseRules::give_up(const End& end, double* x)
     }
     const auto cause = cause_after(end.outcome);
     if (!cause || end.kind == over()) return {};
+    if (!has_inclusion()) return {};
     if (has_own_guards(end.kind)) {
         if (!is_near_surface(end.t, x)) return {};
+        // A guard with a reaction asks that one alone.
+        if (end.reaction != no_reaction && is_clear(end.reaction, y_[end.reaction], x)) return {};
         if (end.t == memory_.gave_up_at) {
             return {PhaseVerdict::Kind::ends, end.kind, 0, Outcome::not_handed_over};
         }
         memory_.gave_up_at = end.t;
-        Mode at = inclusion_.signs(end.t, x);
+        Mode at = inclusion().signs(end.t, x);
         for (std::size_t i = 0; i < count(); ++i) {
             if (is_clear(i, y_[i], x)) continue;
             at = BranchPhases::with_branch(i, Branch::inside, at);
         }
         if (!has_finite_bounds(at, end.t, x)) return {};
-        const Kind next = kind_for(inclusion_.arrive(at, end.t, x), end.t, x, *cause);
-        return change_to(next, end.t, *cause);
+        return change_to(settle(at, end.t, x, *cause), end.t, *cause);
     }
-    if (!end.of_phases) return {};
+    if (!end.of_phases) return ask(end, x, *cause);
     if (*cause == PhaseCause::accumulation && end.which != no_guard) {
-        const std::size_t i = reaction_of(end.which);
-        const Mode b = branches_of(end.kind);
-        inclusion_.hold(BranchPhases::with_branch(i, Branch::inside, b), end.t, x);
+        // Other y may accumulate with it: a position with its speed.
+        Mode at = BranchPhases::with_branch(reaction_of(end.which), Branch::inside,
+                                            branches_of(end.kind));
+        inclusion().observe(end.t, x, y_.data());
+        for (std::size_t i = 0; i < count(); ++i) {
+            if (!is_clear(i, y_[i], x)) at = BranchPhases::with_branch(i, Branch::inside, at);
+        }
+        inclusion().hold(at, end.t, x);
     }
     return change_to(go_by_steps(*cause, end.t, x), end.t, *cause, options_.step);
 }
@@ -597,7 +760,7 @@ void PhaseRules::save(std::vector<double>& memory) const
     memory.resize(remembered);
     std::memcpy(memory.data(), &memory_, sizeof memory_);
     memory.insert(memory.end(), sides_.begin(), sides_.end());
-    inclusion_.save(memory);
+    if (has_inclusion()) inclusion().save(memory);
 }
 
 void PhaseRules::restore(const std::vector<double>& memory)
@@ -605,7 +768,8 @@ void PhaseRules::restore(const std::vector<double>& memory)
     std::memcpy(static_cast<void*>(&memory_), memory.data(), sizeof memory_);
     const double* const sides = memory.data() + remembered;
     std::copy_n(sides, sides_.size(), sides_.begin());
-    inclusion_.restore(std::span(memory).subspan(remembered + sides_.size()));
+    if (has_inclusion()) inclusion().restore(std::span(memory).subspan(remembered + sides_.size()));
+    reason_.clear();
     const auto listed = static_cast<std::size_t>(memory_.listed);
     if (phases_.size() > listed) phases_.resize(listed);
 }

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "../core/phase_table.hpp"
@@ -28,36 +29,50 @@ struct PhaseOptions {
     double step = 0;  ///< [s] length of implicit steps
 };
 
+/// The inclusion of a mode of the system.
+struct ModeInclusion {
+    Mode mode = 0;
+    BranchPhases* inclusion = nullptr;  ///< null: the system's own flow is followed
+    /// Of each guard of the system: the reaction whose y it is, or `no_reaction`.
+    std::vector<std::size_t> stands_for{};
+    std::vector<bool> watched{};  ///< reactions whose y is watched in own phases
+};
+
 class PhaseRules {
 public:
     static constexpr Kind own = 0;
     /// Those of `BranchPhases`, and y, which is watched in own phases.
     static constexpr std::size_t guards_of_reaction = BranchPhases::guards_of_reaction + 1;
 
-    PhaseRules(BranchPhases& inclusion, const PhaseOptions& options)
-        : inclusion_(inclusion), options_(options)
-    {
-    }
+    /// @param any      the inclusion of some mode, which has the sizes of all
+    /// @param by_mode  there is one inclusion for each mode, which holds wherever the mode does
+    PhaseRules(const BranchPhases& any, bool by_mode, const PhaseOptions& options);
 
     [[nodiscard]] const PhaseOptions& options() const noexcept { return options_; }
 
-    /// Chooses the reactions whose y is watched in own phases: where both bounds are finite, or a
-    /// guard of the system stands for y. One with an infinite bound, such as the reaction of a
-    /// floor to a speed, may be a law of some modes only.
-    /// @param stands_for  the reaction that each guard of the system stands for
-    void watch(const double* x0, std::span<const std::size_t> stands_for);
+    /// Chooses the reactions whose y is watched in own phases: those of a mode of its own, where
+    /// both bounds are finite, or a guard of the system stands for y. Another one with an infinite
+    /// bound, such as the reaction of a floor to a speed, may be a law of some modes only.
+    void choose_watched(ModeInclusion& of, const double* x0);
+    /// Lets the rules be about a mode of the system, until the next call.
+    PhaseRules& in(const ModeInclusion& now) noexcept
+    {
+        now_ = &now;
+        return *this;
+    }
+    [[nodiscard]] const ModeInclusion& now() const noexcept { return *now_; }
 
     // --- kinds ---
 
     [[nodiscard]] Kind kinds() const noexcept { return over() + 1; }
-    [[nodiscard]] Kind across() const noexcept { return 1 + 2 * inclusion_.branch_modes(); }
+    [[nodiscard]] Kind across() const noexcept { return 1 + 2 * branch_modes_; }
     [[nodiscard]] bool is_approach(Kind kind) const noexcept
     {
         return kind > across() && kind < over();
     }
     [[nodiscard]] bool is_explicit(Kind kind) const noexcept
     {
-        return (kind != own && kind <= inclusion_.branch_modes()) || is_approach(kind);
+        return (kind != own && kind <= branch_modes_) || is_approach(kind);
     }
     /// Whether the guards that stand for a y are watched.
     [[nodiscard]] bool has_own_guards(Kind kind) const noexcept
@@ -66,18 +81,18 @@ public:
     }
     [[nodiscard]] bool is_implicit(Kind kind) const noexcept
     {
-        return kind > inclusion_.branch_modes() && kind <= across();
+        return kind > branch_modes_ && kind <= across();
     }
     /// Of a kind with branches, else 0.
     [[nodiscard]] Mode branches_of(Kind kind) const noexcept
     {
         if (is_approach(kind)) return kind - 1 - across();
         if (is_explicit(kind)) return kind - 1;
-        return is_implicit(kind) && kind != across() ? kind - 1 - inclusion_.branch_modes() : 0;
+        return is_implicit(kind) && kind != across() ? kind - 1 - branch_modes_ : 0;
     }
     [[nodiscard]] bool holds(Kind kind) const noexcept
     {
-        return is_explicit(kind) && inclusion_.holds(branches_of(kind));
+        return is_explicit(kind) && inclusion().holds(branches_of(kind));
     }
 
     // --- the motion ---
@@ -99,12 +114,16 @@ public:
 
     /// The kind of phase in which a run starts. @throws InclusionRefused
     [[nodiscard]] Kind enter(double t, double* x);
+    /// The kind of phase that follows from (t, x) alone: after a change of mode that has changed
+    /// the inclusion, and after the reset of a change.
+    [[nodiscard]] Kind enter_mode(Kind before, double t, double* x);
 
-    /// A guard of a set: one of the phases, or one of the system that stands for a reaction.
+    /// A guard of a set: one of the phases, or one of the system with a reaction.
     struct Fired {
-        std::size_t which = no_guard;  ///< of the phases
-        std::size_t guard = no_guard;  ///< of the system
-        std::size_t reaction = no_reaction;
+        std::size_t which = no_guard;        ///< of the phases
+        std::size_t guard = no_guard;        ///< of the system
+        std::size_t reaction = no_reaction;  ///< whose y the guard is
+        std::size_t asks = no_reaction;      ///< that is asked where its y is at rest
     };
     struct Set {
         Kind kind;
@@ -114,6 +133,14 @@ public:
         const double* before;
     };
     [[nodiscard]] Kind decide(const Set& set, double* x);
+    /// Forgets the changes of the set before.
+    void forget_changes();
+    /// Moves x, where reactions have arrived, onto the side that their y come from. False where
+    /// that is impossible.
+    [[nodiscard]] bool step_back(double t, double* x);
+    /// Whether the flow of the system at (t, x), on that side, is that of the inclusion.
+    [[nodiscard]] bool is_flow(double t, const double* x, const double* rate);
+    [[nodiscard]] Kind end_as_violated() { return end_with(Outcome::law_violated); }
     [[nodiscard]] std::span<const ReactionChange> changes() const noexcept { return changes_; }
     /// Whether a guard of the system has an event of its own in the last set.
     [[nodiscard]] bool records(std::size_t reaction, std::size_t guard) const;
@@ -139,15 +166,18 @@ public:
         double t;
         bool of_phases;        ///< not by a guard of the system
         std::size_t which;     ///< guard of the phases, or `no_guard`
-        std::size_t reaction;  ///< that the guard of the system stands for, or `no_reaction`
+        std::size_t reaction;  ///< of the guard of the system, or `no_reaction`
     };
     [[nodiscard]] Verdict give_up(const End& end, double* x);
 
     // --- records ---
 
+    /// A sentence about the end that the rules have given to the run.
+    [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
     [[nodiscard]] const std::vector<Phase>& phases() const noexcept { return phases_; }
     [[nodiscard]] std::uint64_t implicit_steps() const noexcept { return implicit_steps_; }
 
+    // In the mode in which the run is.
     void save(std::vector<double>& memory) const;
     void restore(const std::vector<double>& memory);
 
@@ -173,23 +203,22 @@ private:
     };
     static constexpr std::size_t remembered = sizeof(Memory) / sizeof(double);
 
-    [[nodiscard]] Kind over() const noexcept { return across() + 1 + inclusion_.branch_modes(); }
+    [[nodiscard]] Kind over() const noexcept { return across() + 1 + branch_modes_; }
     [[nodiscard]] Kind approach_in(Mode b) const noexcept { return across() + 1 + b; }
     [[nodiscard]] Kind explicit_in(Mode b) const noexcept { return 1 + b; }
-    [[nodiscard]] Kind implicit_in(Mode b) const noexcept
-    {
-        return 1 + inclusion_.branch_modes() + b;
-    }
+    [[nodiscard]] Kind implicit_in(Mode b) const noexcept { return 1 + branch_modes_ + b; }
     [[nodiscard]] bool is_set_valued(Kind kind) const noexcept
     {
         return holds(kind) || is_implicit(kind);
     }
-    [[nodiscard]] std::size_t count() const noexcept { return inclusion_.reactions(); }
+    [[nodiscard]] bool has_inclusion() const noexcept { return now_->inclusion != nullptr; }
+    [[nodiscard]] BranchPhases& inclusion() const noexcept { return *now_->inclusion; }
+    [[nodiscard]] std::size_t count() const noexcept { return count_; }
 
     /// Size of y_i that the tolerances of a step resolve.
     [[nodiscard]] double resolution(std::size_t i, const double* x) const
     {
-        return options_.atol + options_.rtol * inclusion_.size_of_row(i, x);
+        return options_.atol + options_.rtol * inclusion().size_of_row(i, x);
     }
     /// Whether y_i is farther from zero than the error of a thousand steps.
     [[nodiscard]] bool is_clear(std::size_t i, double y, const double* x) const
@@ -206,11 +235,24 @@ private:
     /// Branches of an explicit phase after resets that have moved the state from `before`.
     [[nodiscard]] Mode branches_after(Mode b, double t, const double* x);
     [[nodiscard]] Mode branches_before(const Set& set) const;
-    [[nodiscard]] bool has_finite_bounds(Mode at, double t, const double* x);
+    [[nodiscard]] bool has_finite_bounds(Mode at, double t, const double* x)
+    {
+        return unbounded(at, t, x) == no_reaction;
+    }
 
+    /// Whether the system's own flow is followed from (t, x).
+    [[nodiscard]] bool goes_by_itself(double t, const double* x);
+    /// The kind of phase where the y of the reactions marked inside are zero.
+    [[nodiscard]] Kind settle(Mode at, double t, double* x, PhaseCause cause);
+    /// The same, where the mode of `BranchPhases` is b if there is one motion.
+    [[nodiscard]] Kind determined_kind(Mode at, Mode b, double t, const double* x,
+                                       PhaseCause cause);
     /// The kind of phase for a mode of `BranchPhases`.
     [[nodiscard]] Kind kind_for(Mode b, double t, const double* x, PhaseCause cause);
     [[nodiscard]] Kind go_by_steps(PhaseCause cause, double t, const double* x);
+    /// The first reaction that is unbounded at the bound where `at` has it, or `no_reaction`.
+    [[nodiscard]] std::size_t unbounded(Mode at, double t, const double* x);
+    [[nodiscard]] std::string sentence_of_unbounded(std::size_t i) const;
     [[nodiscard]] Kind end_with(Outcome outcome) noexcept
     {
         memory_.outcome = static_cast<double>(outcome);
@@ -227,6 +269,12 @@ private:
     [[nodiscard]] bool may_arrive(const Step& step, double reach);
     /// Whether the flow of the system is that of the inclusion in branches b.
     [[nodiscard]] bool is_flow_of(Mode b, const Step& step, const double* x);
+    [[nodiscard]] static constexpr Mode other_side(std::size_t i, Mode b) noexcept
+    {
+        const bool low = BranchPhases::branch(i, b) == Branch::lower;
+        return BranchPhases::with_branch(i, low ? Branch::upper : Branch::lower, b);
+    }
+    [[nodiscard]] Verdict ask(const End& end, double* x, PhaseCause cause);
     [[nodiscard]] Verdict review_own(const Step& step, const double* x);
     [[nodiscard]] Verdict review_explicit(Kind kind, double t, double* x);
     [[nodiscard]] Verdict review_implicit(Kind kind, double t, bool has_advanced, double* x);
@@ -250,11 +298,16 @@ private:
         return kind_of_guard(which) == BranchPhases::guards_of_reaction;
     }
 
-    BranchPhases& inclusion_;
+    const BranchPhases& any_;
+    const ModeInclusion* now_ = nullptr;
+    Mode branch_modes_;
+    std::size_t count_, size_;  ///< of reactions, and of components
+    bool by_mode_;
     PhaseOptions options_;
-    std::vector<bool> watched_;
+    std::string reason_;
     Memory memory_;
-    std::vector<double> sides_;  ///< sign of each y when it was last not zero
+    std::vector<double> sides_;         ///< sign of each y when it was last not zero
+    std::vector<double> sides_before_;  ///< at the last set
     std::vector<double> y_, y_before_, lower_, upper_, rates_, flow_;
     std::vector<bool> arrived_;
     std::vector<std::size_t> kept_;

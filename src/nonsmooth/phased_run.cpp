@@ -37,9 +37,12 @@ public:
         const std::uint64_t implicit = system_.rules().implicit_steps();
         out.event_driven = run.statistics;
         out.event_driven.steps -= std::min(implicit, run.statistics.steps);
-        out.set_valued.attempted = system_.inclusion().attempts();
         out.set_valued.accepted = implicit;
-        out.set_valued.stages = system_.inclusion().stages();
+        for (const auto& inclusion : system_.inclusions()) {
+            if (!inclusion) continue;
+            out.set_valued.attempted += inclusion->attempts();
+            out.set_valued.stages += inclusion->stages();
+        }
         const std::vector<Phase>& phases = this->phases();
         for (std::size_t k = 0; k < phases.size(); ++k) {
             if (!phases[k].set_valued) {
@@ -52,10 +55,7 @@ public:
         }
         return out;
     }
-    [[nodiscard]] const StageReport& failure() const noexcept override
-    {
-        return system_.inclusion().failure();
-    }
+    [[nodiscard]] const StageReport& failure() const noexcept override { return system_.failure(); }
 
 private:
     [[nodiscard]] static PhaseOptions phase_options(const Options& options)
@@ -93,6 +93,14 @@ HandOverOptions options_of_phases(const Options& options)
         supported.component_atol.clear();
     }
     return hand_over_options(supported);
+}
+
+BranchPhasesOptions branch_options(const Options& options)
+{
+    const HandOverOptions of = completed(options_of_phases(options), false);
+    return {.scheme = of.set_valued.scheme,
+            .step = of.set_valued.step,
+            .event_tolerance = of.event_tolerance};
 }
 
 template <>

@@ -16,6 +16,9 @@
 // guards are watched in all phases, except those that stand for a y while the inclusion decides.
 #pragma once
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -41,9 +44,12 @@ public:
     PhasedSystem(PhasedSetup<C>&& setup, const C& x0, const PhaseOptions& options)
         : user_(setup.user),
           own_(*setup.user.system),
+          by_mode_(setup.by_mode),
           start_mode_(setup.start_mode),
-          inclusion_(std::move(setup.inclusion)),
-          rules_(*inclusion_, options),
+          change_(setup.change),
+          inclusions_(std::move(setup.inclusions)),
+          rules_(some_inclusion(), by_mode_, options),
+          reactions_(some_inclusion().reactions()),
           guards_(own_.guarded ? own_.guard_count(user_.door) : 0)
     {
         if (own_.moded && own_.mode_count(user_.door) >= own_modes) {
@@ -54,8 +60,8 @@ public:
             infos_.push_back(own_.info(user_.door, i));
             infos_.back().resets = infos_.back().resets && own_.resets();
         }
-        find_reactions_of_guards(x0);
-        rules_.watch(x0.data(), stands_for_);
+        make_modes(x0);
+        find_asked_reactions();
         make_kernels(setup.method, x0.size());
         make_table();
         make_phases();
@@ -65,14 +71,25 @@ public:
 
     [[nodiscard]] const SystemTable<C>& table() const noexcept { return table_; }
     [[nodiscard]] const PhaseRules& rules() const noexcept { return rules_; }
-    [[nodiscard]] const BranchPhases& inclusion() const noexcept { return *inclusion_; }
+    /// The stage that has had no solution.
+    [[nodiscard]] const StageReport& failure() const
+    {
+        const BranchPhases* const here = inclusion_of(mode_).inclusion;
+        return here ? here->failure() : some_inclusion().failure();
+    }
+    /// The inclusions of all modes that have one.
+    [[nodiscard]] const std::vector<Owner<BranchPhases>>& inclusions() const noexcept
+    {
+        return inclusions_;
+    }
 
     /// The mode in which a run starts at (t, x) in a mode of the user's.
     [[nodiscard]] Mode enter(Mode mode, double t, C& x)
     {
         const std::size_t modes = own_.moded ? own_.mode_count(user_.door) : 1;
         if (modes > 0 && mode >= modes) throw_unknown_mode("integrate", mode, modes);
-        return with(rules_.enter(t, x.data()), mode);
+        mode_ = mode;
+        return with(in(mode).enter(t, x.data()), mode);
     }
 
 private:
@@ -86,15 +103,39 @@ private:
     {
         return kind * own_modes + mode;
     }
+    [[nodiscard]] bool is_mode(Mode mode) const
+    {
+        const std::size_t modes = own_.moded ? own_.mode_count(user_.door) : 1;
+        return mode < (modes > 0 ? modes : own_modes - 1);
+    }
     /// The user's mode after a reset, or one that no system has.
     [[nodiscard]] Mode reached(Kind kind, Mode mode) const
     {
-        const std::size_t modes = own_.moded ? own_.mode_count(user_.door) : 1;
-        const std::size_t most = modes > 0 ? modes : own_modes - 1;
-        return mode < most ? with(kind, mode) : std::numeric_limits<Mode>::max();
+        return is_mode(mode) ? with(kind, mode) : std::numeric_limits<Mode>::max();
+    }
+    [[nodiscard]] bool changes_inclusion(Mode from, Mode to) const
+    {
+        const BranchPhases* const before = inclusion_of(from).inclusion;
+        return before != inclusion_of(to).inclusion;
     }
 
-    void find_reactions_of_guards(const C& x0);
+    /// The rules of a mode of the user's.
+    PhaseRules& in(Mode mode) const
+    {
+        if (mode == seen_) return rules_;
+        seen_ = mode;
+        if (by_mode_) return rules_.in(mode < modes_.size() ? modes_[mode] : none_);
+        return rules_.in(is_active(mode) ? modes_[0] : none_);
+    }
+    [[nodiscard]] const ModeInclusion& inclusion_of(Mode mode) const { return in(mode).now(); }
+    /// Whether some guard with a reaction is enabled in a mode, or no guard has one.
+    [[nodiscard]] bool is_active(Mode mode) const;
+
+    [[nodiscard]] const BranchPhases& some_inclusion() const;
+    void make_modes(const C& x0);
+    void find_asked_reactions();
+    void refuse_partly_active() const;
+    void find_reactions_of_guards(ModeInclusion& of, const C& x0);
     void make_kernels(MethodName method, std::size_t size);
     void make_table();
     void add_guards();
@@ -106,25 +147,25 @@ private:
 
     [[nodiscard]] std::size_t all_guards() const noexcept
     {
-        return guards_ + PhaseRules::guards_of_reaction * inclusion_->reactions();
+        return guards_ + PhaseRules::guards_of_reaction * reactions_;
     }
     [[nodiscard]] GuardInfo info(std::size_t i) const
     {
         if (i >= guards_) return rules_.guard_info(i - guards_);
         GuardInfo info = infos_[i];
         // What stands for a y changes the motion there.
-        if (stands_for_[i] != no_reaction && !info.unilateral) info.resets = true;
+        if (stands_somewhere_[i] && !info.unilateral) info.resets = true;
         return info;
     }
     void guards(Mode mode, double t, const C& x, std::span<double> g) const
     {
         if (guards_ > 0) own_.guards(user_.door, own_mode(mode), t, x, g.first(guards_));
-        rules_.guards(kind_of(mode), t, x.data(), g.subspan(guards_));
+        in(own_mode(mode)).guards(kind_of(mode), t, x.data(), g.subspan(guards_));
     }
     [[nodiscard]] double guard(std::size_t i, Mode mode, double t, const C& x) const
     {
         if (i < guards_) return own_.guard(user_.door, i, own_mode(mode), t, x);
-        return rules_.guard(i - guards_, kind_of(mode), t, x.data());
+        return in(own_mode(mode)).guard(i - guards_, kind_of(mode), t, x.data());
     }
     [[nodiscard]] double rate(GuardInMode of, ScaledTime time, const C& x, const C& dxdt) const
     {
@@ -132,8 +173,8 @@ private:
         if (of.which < guards_) {
             return own_.rate(user_.door, {of.which, mode, of.backward}, time, x, dxdt);
         }
-        return rules_.guard_rate(of.which - guards_, kind_of(of.mode), time.t, x.data(),
-                                 dxdt.data());
+        return in(mode).guard_rate(of.which - guards_, kind_of(of.mode), time.t, x.data(),
+                                   dxdt.data());
     }
     void rates(const Along<C>& motion, std::span<double> rates) const
     {
@@ -146,14 +187,29 @@ private:
                 rates[i] = own_.rate(user_.door, {i, mode}, {motion.t, 0}, motion.x, motion.s);
             }
         }
-        rules_.guard_rates(kind_of(motion.mode), motion.t, motion.x.data(), motion.s.data(),
-                           rates.subspan(guards_));
+        in(mode).guard_rates(kind_of(motion.mode), motion.t, motion.x.data(), motion.s.data(),
+                             rates.subspan(guards_));
+    }
+    /// The reaction whose y a guard of the user's is, in a mode of the user's.
+    [[nodiscard]] std::size_t stands_for(std::size_t i, Mode mode) const
+    {
+        const ModeInclusion& of = inclusion_of(mode);
+        return of.stands_for.empty() ? no_reaction : of.stands_for[i];
+    }
+    /// The reaction that is asked where events of a guard of the user's cannot go on.
+    [[nodiscard]] std::size_t reaction_of(std::size_t i, Mode mode) const
+    {
+        const std::size_t its_own = stands_for(i, mode);
+        return its_own != no_reaction || !inclusion_of(mode).inclusion ? its_own
+                                                                       : infos_[i].reaction;
     }
     [[nodiscard]] bool enabled(std::size_t i, Mode mode) const
     {
         const Kind kind = kind_of(mode);
-        if (i >= guards_) return rules_.enabled(i - guards_, kind);
-        if (!rules_.has_own_guards(kind) && stands_for_[i] != no_reaction) return false;
+        if (i >= guards_) return in(own_mode(mode)).enabled(i - guards_, kind);
+        if (!rules_.has_own_guards(kind) && stands_for(i, own_mode(mode)) != no_reaction) {
+            return false;
+        }
         return !own_.enabled_in || own_.enabled_in(user_.door, i, own_mode(mode));
     }
 
@@ -185,9 +241,18 @@ private:
     {
         const C before = x;
         const Mode own = own_.rest(user_.door, i, own_mode(mode), t, x);
-        if (kind_of(mode) == PhaseRules::own) return reached(PhaseRules::own, own);
-        const PhaseSet<C> set{{}, false, false, t, mode, mode, before};
-        return reached(kind_of(decide(set, x)), own);
+        if (!is_mode(own)) return std::numeric_limits<Mode>::max();
+        mode_ = own;
+        if (changes_inclusion(own_mode(mode), own)) {
+            rules_.forget_changes();
+            return with(in(own).enter_mode(kind_of(mode), t, x.data()), own);
+        }
+        if (kind_of(mode) == PhaseRules::own && reaction_of(i, own) == no_reaction) {
+            return with(PhaseRules::own, own);
+        }
+        const std::size_t fired[] = {i};
+        const PhaseSet<C> set{fired, false, false, t, mode, with(kind_of(mode), own), before};
+        return decide(set, x);
     }
 
     // --- phases ---
@@ -197,46 +262,40 @@ private:
         const Kind kind = kind_of(mode);
         if (kind == PhaseRules::own) return {user_.kernel, user_.door, own_.flow};
         if (rules_.is_implicit(kind)) return {&implicit_, this, table_.flow};
-        return {rules_.holds(kind) ? &held_ : free_, this, table_.flow};
+        return {in(own_mode(mode)).holds(kind) ? &held_ : free_, this, table_.flow};
     }
     bool flow(Mode mode, double t, const C& x, C& dxdt)
     {
         const Kind kind = kind_of(mode);
         if (kind == PhaseRules::own) return own_.flow(user_.door, own_mode(mode), t, x, dxdt);
-        rules_.flow(kind, t, x.data(), dxdt.data());
+        in(own_mode(mode)).flow(kind, t, x.data(), dxdt.data());
         return true;
     }
-    [[nodiscard]] Mode decide(const PhaseSet<C>& set, C& after)
-    {
-        fired_.clear();
-        for (const std::size_t i : set.fired) {
-            if (i >= guards_) {
-                fired_.push_back({i - guards_, no_guard, no_reaction});
-            } else if (stands_for_[i] != no_reaction) {
-                fired_.push_back({no_guard, i, stands_for_[i]});
-            }
-        }
-        const Kind kind = rules_.decide({.kind = kind_of(set.before),
-                                         .t = set.t,
-                                         .fired = fired_,
-                                         .on_time = set.on_time,
-                                         .on_change = set.on_change,
-                                         .before = set.x.data()},
-                                        after.data());
-        return with(kind, own_mode(set.after));
-    }
+    [[nodiscard]] Mode decide(const PhaseSet<C>& set, C& after);
+    /// The kind of phase after a set that leaves the inclusion as it is.
+    [[nodiscard]] Kind decide_kind(const PhaseSet<C>& set, C& after);
+    /// Whether the user's flow is that of the inclusion where reactions of a set have arrived.
+    [[nodiscard]] bool agrees(const PhaseSet<C>& set);
+    /// Calls the reset of the changes of a set.
+    [[nodiscard]] Mode after_changes(Mode decided, double t, C& x);
     [[nodiscard]] std::span<const ReactionChange> changes();
-    [[nodiscard]] PhaseVerdict verdict(const PhaseRules::Verdict& of, Mode mode, double t,
-                                       const C& x) const
+    [[nodiscard]] PhaseVerdict verdict(const PhaseRules::Verdict& of, Mode mode, double t, C& x)
     {
         PhaseVerdict out{.kind = of.what, .h = of.h, .outcome = of.outcome};
         Mode own = own_mode(mode);
         const bool releases = of.what == PhaseVerdict::Kind::changes &&
                               of.kind == PhaseRules::own && !rules_.has_own_guards(kind_of(mode));
         if (start_mode_ && releases) {
-            own = start_mode_(user_.door, t, x);
+            own = start_mode_(user_.door, own, t, x);
+            if (!is_mode(own)) return {PhaseVerdict::Kind::ends, mode, 0, Outcome::unknown_mode};
+            if (changes_inclusion(own_mode(mode), own)) {
+                out.mode = with(in(own).enter_mode(of.kind, t, x.data()), own);
+                mode_ = own;
+                return out;
+            }
         }
-        out.mode = reached(of.kind, own);
+        mode_ = own;
+        out.mode = with(of.kind, own);
         return out;
     }
 
@@ -248,6 +307,10 @@ private:
         return {step.start.value, step.x0.data(), rules_.branches_of(kind),
                 kind == rules_.across()};
     }
+    [[nodiscard]] BranchPhases& inclusion(const StepState<C>& step) const
+    {
+        return *inclusion_of(own_mode(step.mode)).inclusion;
+    }
     [[nodiscard]] double take_implicit(StepState<C>& step, double h)
     {
         step.h = h;
@@ -255,7 +318,7 @@ private:
         step.asked_alone = 0;
         ++step.flow_calls;
         const bool solved =
-            inclusion_->take(implicit_start(step), h, step.x1.data(), step.rate1.data());
+            inclusion(step).take(implicit_start(step), h, step.x1.data(), step.rate1.data());
         if (!solved) return std::numeric_limits<double>::quiet_NaN();
         for_each_component(
             step.x1, [&](auto i) { step.w[i] = (step.x1[i] - step.x0[i]) - h * step.rate0[i]; });
@@ -265,7 +328,7 @@ private:
     {
         assign(w, step.x0);
         assign(rate, step.rate0);
-        inclusion_->take_to(implicit_start(step), step.h, s, w.data(), rate.data());
+        inclusion(step).take_to(implicit_start(step), step.h, s, w.data(), rate.data());
         for_each_component(w, [&](auto i) {
             w[i] = (w[i] - step.x0[i]) - s * step.rate0[i];
             rate[i] -= step.rate0[i];
@@ -276,20 +339,29 @@ private:
     {
         const double error = free_->attempt(this, step, h, rtol, atol);
         if (!(error <= 1)) return error;
-        const double fraction = rules_.fraction_of_held(
-            kind_of(step.mode), step.start.value, step.x0.data(), step.time(h), step.x1.data());
+        const double fraction = in(own_mode(step.mode))
+                                    .fraction_of_held(kind_of(step.mode), step.start.value,
+                                                      step.x0.data(), step.time(h), step.x1.data());
         if (fraction == 1) return error;
         return std::max(error, std::pow(0.9 / fraction, free_->error_order + 1));
     }
 
     RunSetup<C> user_;
     const SystemTable<C>& own_;
-    Mode (*start_mode_)(void* door, double t, const C& x);
-    Owner<BranchPhases> inclusion_;
-    PhaseRules rules_;
-    std::size_t guards_;                   ///< number of the user's
-    std::vector<GuardInfo> infos_;         ///< of the user's
-    std::vector<std::size_t> stands_for_;  ///< reaction whose y a guard of the user's is
+    bool by_mode_;  ///< one inclusion for each mode, else the first in all modes
+    Mode (*start_mode_)(void* door, Mode mode, double t, const C& x);
+    Mode (*change_)(void* door, std::size_t reaction, EventKind kind, Mode mode, double t, C& x);
+    std::vector<Owner<BranchPhases>> inclusions_;
+    std::vector<ModeInclusion> modes_;
+    const ModeInclusion none_;
+    mutable PhaseRules rules_;
+    mutable Mode seen_ = std::numeric_limits<Mode>::max();  ///< that the rules are about
+    Mode mode_ = 0;                                         ///< of the user's, in which the run is
+    std::size_t reactions_;                                 ///< their number
+    std::size_t guards_;                                    ///< number of the user's
+    std::vector<GuardInfo> infos_;                          ///< of the user's
+    std::vector<bool> stands_somewhere_;  ///< guards of the user's that are a y in some mode
+    std::vector<bool> has_reaction_;      ///< guards of the user's with a reaction in some mode
     std::vector<std::size_t> own_fired_;
     std::vector<PhaseRules::Fired> fired_;
     std::vector<ReactionChange> changes_;
@@ -299,12 +371,99 @@ private:
     PhaseTable<C> phases_;
 };
 
-/// A guard stands for a y if it vanishes where that y does and not elsewhere, at four states around
-/// the start. One that cannot be evaluated there stands for none.
 template <class C>
-void PhasedSystem<C>::find_reactions_of_guards(const C& x0)
+const BranchPhases& PhasedSystem<C>::some_inclusion() const
 {
-    stands_for_.assign(guards_, no_reaction);
+    for (const auto& inclusion : inclusions_) {
+        if (inclusion) return *inclusion;
+    }
+    throw std::invalid_argument(
+        "integrate: set_valued(mode) gives no mode an inclusion; expected it to give one to some");
+}
+
+template <class C>
+void PhasedSystem<C>::make_modes(const C& x0)
+{
+    stands_somewhere_.assign(guards_, false);
+    for (std::size_t mode = 0; mode < inclusions_.size(); ++mode) {
+        ModeInclusion of{.mode = static_cast<Mode>(mode),
+                         .inclusion = inclusions_[mode].operator->()};
+        if (of.inclusion) find_reactions_of_guards(of, x0);
+        rules_.choose_watched(of, x0.data());
+        for (std::size_t i = 0; i < of.stands_for.size(); ++i) {
+            stands_somewhere_[i] = stands_somewhere_[i] || of.stands_for[i] != no_reaction;
+        }
+        modes_.push_back(std::move(of));
+    }
+}
+
+template <class C>
+void PhasedSystem<C>::find_asked_reactions()
+{
+    for (std::size_t i = 0; i < guards_; ++i) {
+        const std::size_t reaction = infos_[i].reaction;
+        if (reaction != no_reaction && reaction >= reactions_) {
+            throw std::invalid_argument(fmt::format(
+                "integrate: guard {} has reaction {}; expected one below {}, the number of "
+                "reactions of set_valued()",
+                i, reaction, reactions_));
+        }
+        has_reaction_.push_back(stands_somewhere_[i] || reaction != no_reaction);
+    }
+    refuse_partly_active();
+}
+
+/// Which guards a system of countless modes disables is not known before they are reached.
+template <class C>
+void PhasedSystem<C>::refuse_partly_active() const
+{
+    constexpr std::size_t most = 4096;
+    if (by_mode_ || !own_.enabled_in || !own_.moded) return;
+    const std::size_t modes = std::min(own_.mode_count(user_.door), most);
+    for (std::size_t mode = 0; mode < modes; ++mode) {
+        std::size_t inactive = no_reaction, active = 0;
+        for (std::size_t k = 0; k < reactions_; ++k) {
+            bool any = false, enabled = false;
+            for (std::size_t i = 0; i < guards_; ++i) {
+                const std::size_t its = modes_[0].stands_for[i];
+                if ((its != no_reaction ? its : infos_[i].reaction) != k) continue;
+                any = true;
+                enabled = enabled || own_.enabled_in(user_.door, i, static_cast<Mode>(mode));
+            }
+            if (any && !enabled) {
+                inactive = k;
+            } else {
+                ++active;
+            }
+        }
+        if (inactive == no_reaction || active == 0) continue;
+        throw std::invalid_argument(fmt::format(
+            "integrate: all guards of reaction {} are disabled in mode {}, those of others are "
+            "not; expected set_valued(mode), an inclusion for each mode",
+            inactive, mode));
+    }
+}
+
+template <class C>
+bool PhasedSystem<C>::is_active(Mode mode) const
+{
+    if (!own_.enabled_in) return true;
+    bool any = false;
+    for (std::size_t i = 0; i < has_reaction_.size(); ++i) {
+        if (!has_reaction_[i]) continue;
+        any = true;
+        if (own_.enabled_in(user_.door, i, mode)) return true;
+    }
+    return !any;
+}
+
+/// A guard stands for a y if it vanishes where that y does and not elsewhere, at four states around
+/// the start. One that cannot be evaluated there stands for none. A guard that names a reaction is
+/// compared with the y of that one alone.
+template <class C>
+void PhasedSystem<C>::find_reactions_of_guards(ModeInclusion& of, const C& x0)
+{
+    of.stands_for.assign(guards_, no_reaction);
     double size = 1;
     for (const double component : x0) size = std::max(size, std::fabs(component));
     const auto stands_for = [&](std::size_t i, std::size_t k) {
@@ -315,24 +474,92 @@ void PhasedSystem<C>::find_reactions_of_guards(const C& x0)
             for (std::size_t c = 0; c < static_cast<std::size_t>(x.size()); ++c) {
                 x[c] += 0.3 * size * std::sin(1.7 + 3.1 * static_cast<double>(c) + 5.3 * j);
             }
-            away = std::fmax(away, std::fabs(own_.guard(user_.door, i, 0, t, x)));
-            if (!inclusion_->move_onto(k, t, x.data())) return false;
-            near = std::fmax(near, std::fabs(own_.guard(user_.door, i, 0, t, x)));
+            away = std::fmax(away, std::fabs(own_.guard(user_.door, i, of.mode, t, x)));
+            if (!of.inclusion->move_onto(k, t, x.data())) return false;
+            near = std::fmax(near, std::fabs(own_.guard(user_.door, i, of.mode, t, x)));
         }
         return std::isfinite(away) && away > 0 && near <= 1e-9 * away;
     };
     for (std::size_t i = 0; i < guards_; ++i) {
         if (infos_[i].boolean) continue;
         try {
-            for (std::size_t k = 0; k < inclusion_->reactions(); ++k) {
+            for (std::size_t k = 0; k < of.inclusion->reactions(); ++k) {
+                if (infos_[i].reaction != no_reaction && infos_[i].reaction != k) continue;
                 if (!stands_for(i, k)) continue;
-                stands_for_[i] = k;
+                of.stands_for[i] = k;
                 break;
             }
         } catch (...) {
             // The states are invented, and the run may never come near them.
         }
     }
+}
+
+template <class C>
+Mode PhasedSystem<C>::decide(const PhaseSet<C>& set, C& after)
+{
+    const Mode before = own_mode(set.before), mode = own_mode(set.after);
+    const bool is_own = kind_of(set.before) == PhaseRules::own;
+    mode_ = mode;
+    if (changes_inclusion(before, mode)) {
+        // Numbers of reactions have no meaning across modes.
+        rules_.forget_changes();
+        return with(in(mode).enter_mode(kind_of(set.before), set.t, after.data()), mode);
+    }
+    Kind kind = decide_kind(set, after);
+    const bool hands_over = is_own && !rules_.has_own_guards(kind) && !rules_.changes().empty();
+    if (hands_over && !agrees(set)) kind = rules_.end_as_violated();
+    const Mode decided = with(kind, mode);
+    return change_ && !rules_.changes().empty() ? after_changes(decided, set.t, after) : decided;
+}
+
+template <class C>
+Kind PhasedSystem<C>::decide_kind(const PhaseSet<C>& set, C& after)
+{
+    const Mode mode = own_mode(set.after);
+    fired_.clear();
+    for (const std::size_t i : set.fired) {
+        if (i >= guards_) {
+            fired_.push_back({.which = i - guards_});
+        } else if (const std::size_t k = stands_for(i, mode); k != no_reaction) {
+            fired_.push_back({.guard = i, .reaction = k});
+        } else if (const std::size_t asks = reaction_of(i, mode); asks != no_reaction) {
+            fired_.push_back({.guard = i, .asks = asks});
+        }
+    }
+    return in(mode).decide({.kind = kind_of(set.before),
+                            .t = set.t,
+                            .fired = fired_,
+                            .on_time = set.on_time,
+                            .on_change = set.on_change,
+                            .before = set.x.data()},
+                           after.data());
+}
+
+template <class C>
+bool PhasedSystem<C>::agrees(const PhaseSet<C>& set)
+{
+    C x = set.x;
+    if (!rules_.step_back(set.t, x.data())) return true;
+    C rate = x;
+    if (!own_.flow(user_.door, own_mode(set.before), set.t, x, rate)) return true;
+    return rules_.is_flow(set.t, x.data(), rate.data());
+}
+
+template <class C>
+Mode PhasedSystem<C>::after_changes(Mode decided, double t, C& x)
+{
+    const Mode mode = own_mode(decided);
+    const C before = x;
+    Mode next = mode;
+    for (const ReactionChange& change : rules_.changes()) {
+        if (change.kind == EventKind::touch) continue;
+        next = change_(user_.door, change.reaction, change.kind, next, t, x);
+        if (!is_mode(next)) return std::numeric_limits<Mode>::max();
+    }
+    if (next == mode && same_state(x, before)) return decided;
+    mode_ = next;
+    return with(in(next).enter_mode(kind_of(decided), t, x.data()), next);
 }
 
 template <class C>
@@ -356,10 +583,10 @@ void PhasedSystem<C>::make_kernels(MethodName method, std::size_t size)
     };
     implicit_.reach = [](void* door, StepState<C>& step, double, double) {
         PhasedSystem& me = at(door);
-        return me.inclusion_->reach(me.implicit_start(step), me.rules_.options().step);
+        return me.inclusion(step).reach(me.implicit_start(step), me.rules_.options().step);
     };
-    implicit_.ends_at_change = [](void* door, const StepState<C>&) {
-        return at(door).inclusion_->ends_at_change();
+    implicit_.ends_at_change = [](void* door, const StepState<C>& step) {
+        return at(door).inclusion(step).ends_at_change();
     };
 }
 
@@ -474,36 +701,45 @@ void PhasedSystem<C>::make_phases()
     t.changes = [](void* door) { return at(door).changes(); };
     t.records = [](void* door, std::size_t i) {
         const PhasedSystem& me = at(door);
-        return i < me.guards_ && me.rules_.records(me.stands_for_[i], i);
+        return i < me.guards_ && me.rules_.records(me.stands_for(i, me.mode_), i);
     };
     t.review = [](void* door, const PhaseStep<C>& step, C& x) {
         PhasedSystem& me = at(door);
-        const auto of = me.rules_.review({.kind = kind_of(step.mode),
-                                          .t = step.t,
-                                          .rate = step.rate.data(),
-                                          .h_next = step.h_next,
-                                          .has_advanced = step.has_advanced},
-                                         x.data());
+        const auto of = me.in(own_mode(step.mode))
+                            .review({.kind = kind_of(step.mode),
+                                     .t = step.t,
+                                     .rate = step.rate.data(),
+                                     .h_next = step.h_next,
+                                     .has_advanced = step.has_advanced},
+                                    x.data());
         return me.verdict(of, step.mode, step.t, x);
     };
     t.give_up = [](void* door, const PhaseEnd<C>& end, C& x) {
         PhasedSystem& me = at(door);
         const bool of_phases = end.guard == no_guard || end.guard >= me.guards_;
-        const std::size_t own = of_phases ? no_reaction : me.stands_for_[end.guard];
+        const Mode mode = own_mode(end.mode);
+        const std::size_t reaction = of_phases ? no_reaction : me.reaction_of(end.guard, mode);
         const std::size_t which =
             of_phases && end.guard != no_guard ? end.guard - me.guards_ : no_guard;
-        const auto of = me.rules_.give_up({.kind = kind_of(end.mode),
-                                           .outcome = end.outcome,
-                                           .t = end.t,
-                                           .of_phases = of_phases,
-                                           .which = which,
-                                           .reaction = own},
-                                          x.data());
+        const auto of = me.in(mode).give_up({.kind = kind_of(end.mode),
+                                             .outcome = end.outcome,
+                                             .t = end.t,
+                                             .of_phases = of_phases,
+                                             .which = which,
+                                             .reaction = reaction},
+                                            x.data());
         return me.verdict(of, end.mode, end.t, x);
     };
-    t.save = [](void* door, std::vector<double>& memory) { at(door).rules_.save(memory); };
+    t.reason = [](void* door) { return std::string_view(at(door).rules_.reason()); };
+    t.save = [](void* door, std::vector<double>& memory) {
+        const PhasedSystem& me = at(door);
+        me.in(me.mode_).save(memory);
+        memory.push_back(static_cast<double>(me.mode_));
+    };
     t.restore = [](void* door, const std::vector<double>& memory) {
-        at(door).rules_.restore(memory);
+        PhasedSystem& me = at(door);
+        me.mode_ = static_cast<Mode>(memory.back());
+        me.in(me.mode_).restore(memory);
     };
 }
 

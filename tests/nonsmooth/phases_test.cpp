@@ -11,24 +11,18 @@
 #include <string>
 #include <vector>
 
+#include "phased_runs.hpp"
 #include "refusal.hpp"
-#include "ricochet/ricochet.hpp"
-#include "sliding_systems.hpp"
 
 namespace ricochet::phases_test {
 namespace {
 
-constexpr double tolerance = 1e-9;
+constexpr double tolerance = exact_motion;
 constexpr double never = std::numeric_limits<double>::infinity();
 
 using One = Slider<1>::State;
 using Two = Slider<2>::State;
 using Three = Slider<3>::State;
-
-[[nodiscard]] Options until(double t_end)
-{
-    return {.t_end = t_end, .rtol = 1e-10, .atol = 1e-12};
-}
 
 [[nodiscard]] GuardInfo bounding()
 {
@@ -84,20 +78,6 @@ template <class Events>
     }
     return times;
 }
-void expect_times(const std::vector<double>& found, const std::vector<double>& expected,
-                  double error = tolerance)
-{
-    ASSERT_EQ(found.size(), expected.size());
-    for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k], expected[k], error) << k;
-}
-
-template <class Run, class State>
-void expect_end(const Run& run, const State& x, double error = tolerance)
-{
-    ASSERT_EQ(run.outcome, Outcome::reached_end);
-    for (std::size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(run.x[i], x[i], error) << i;
-}
-
 // --- guards, resets and time events while a block is held ---
 
 TEST(Phases, ABallMeetsItsFloorWhileABlockIsHeld)
@@ -519,23 +499,6 @@ TEST(Phases, AdvanceShowsEventsOfAllPhases)
     while (simulation.advance()) shown.push_back(simulation.t());
     expect_times(shown, {1, 1.5});
     EXPECT_EQ(simulation.mode(), 0U);
-}
-
-/// Runs to the end by steps; after every tenth a new simulation goes on from what was saved.
-template <class System, class State>
-[[nodiscard]] State end_by_snapshots(const System& system, const State& x0, const Options& options)
-{
-    const auto start = [&] {
-        return std::make_unique<Simulation<System, State>>(system, x0, options);
-    };
-    auto simulation = start();
-    for (int steps = 1; simulation->step(); ++steps) {
-        if (steps % 10 != 0) continue;
-        const Snapshot saved = simulation->save();
-        simulation = start();
-        simulation->restore(saved);
-    }
-    return simulation->x();
 }
 
 TEST(Phases, ASimulationGoesOnFromASnapshotWithTheSameBits)

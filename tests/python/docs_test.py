@@ -16,7 +16,7 @@ from ricochet import _ricochet
 SOURCE = Path(os.environ.get("RICOCHET_SOURCE", Path(__file__).parents[2]))
 
 
-@pytest.mark.parametrize("page, least", [("README.md", 1), ("docs/clocks.md", 1), ("docs/python.md", 8),
+@pytest.mark.parametrize("page, least", [("README.md", 1), ("docs/clocks.md", 1), ("docs/phases.md", 1), ("docs/python.md", 8),
                                          ("docs/python-more.md", 5)])
 def test_blocks_of_the_page_run(page, least):
     # One after the other, in one module, as a reader would; a comment `# -> text` after an expression or a

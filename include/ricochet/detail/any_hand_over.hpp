@@ -61,6 +61,14 @@ private:
             if (branching_) {
                 State& start = run_.state;
                 modes_.check_bounds(start.t, start.w);
+                if (!keeps_reaction_) {
+                    const auto at = modes_.zero_branches(start.t, start.w);
+                    const std::size_t which = modes_.undetermined(at, start.t, start.w);
+                    if (which != no_reaction) {
+                        run_.failure.set = static_cast<int>(which);
+                        return end_with(Outcome::several);
+                    }
+                }
                 const Mode mode = keeps_reaction_
                                       ? modes_.mode_after(start, 10 * resolution(start.w))
                                       : modes_.mode_at(start.t, start.w);

@@ -202,6 +202,11 @@ public:
         return faulty(t, w) >= 0 ? empty : settle(at, t, w);
     }
 
+    /// The first reaction that is at different branches in two motions which both satisfy the law,
+    /// where the y of the reactions marked inside are zero; `no_reaction` where one motion or none
+    /// does. Only a W with a principal minor that is not positive allows several.
+    [[nodiscard]] std::size_t undetermined(const Branches& at, double t, const Vector& w) const;
+
     /// The branches that follow from the signs of y; inside where y is zero up to rounding.
     [[nodiscard]] Branches zero_branches(double t, const Vector& w) const;
 
@@ -260,6 +265,7 @@ private:
         for (Eigen::Index i = 0; i < count; ++i) {
             for (Eigen::Index j = 0; j < count; ++j) block(i, j) = terms_.delassus(at(i), at(j));
         }
+        is_unique_ = is_unique_ && block.determinant() > 0;
         hold.determined = invert(block, block) == count;
         if (!hold.determined) return;
         hold.largest = block.cwiseAbs().maxCoeff();
@@ -428,6 +434,22 @@ private:
         return fitted_rates(later, here, size, times);
     }
 
+    /// The inequality for the y' of the reactions marked inside. The others are at their bounds.
+    void state(const Branches& at, double t, const Vector& w, LinearInequality<M>& out) const
+    {
+        Vector f;
+        matrices_.smooth(t, w, f);
+        out.unknowns = count();
+        out.w = terms_.delassus;
+        out.y0.noalias() = times(terms_.observe, times(terms_.inverse_mass, f));
+        if (moves()) out.y0 -= offset_rate(t);
+        matrices_.inclusion().branch_bounds(t, w, out.lower, out.upper);
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (at[i] == Branch::lower) out.upper[i] = out.lower[i];
+            if (at[i] == Branch::upper) out.lower[i] = out.upper[i];
+        }
+    }
+
     [[nodiscard]] Mode checked(Mode mode) const noexcept { return flows(mode) ? mode : no_flow; }
 
     /// The branches that follow where the y of those marked inside are zero. The rates decide, by a
@@ -437,17 +459,9 @@ private:
         const Mode mode = mode_of(at);
         if (mask_of(mode) == 0) return mode;
         if (is_static(at)) return settle_static(at, 0, t, w);
-        Vector f;
-        matrices_.smooth(t, w, f);
         LinearInequality<M> inequality;
-        inequality.unknowns = count();
-        inequality.w = terms_.delassus;
-        inequality.y0.noalias() = times(terms_.observe, times(terms_.inverse_mass, f));
-        if (moves()) inequality.y0 -= offset_rate(t);
-        matrices_.inclusion().branch_bounds(t, w, inequality.lower, inequality.upper);
+        state(at, t, w, inequality);
         for (Eigen::Index i = 0; i < M; ++i) {
-            if (at[i] == Branch::lower) inequality.upper[i] = inequality.lower[i];
-            if (at[i] == Branch::upper) inequality.lower[i] = inequality.upper[i];
             // A reaction without influence on y' is at one bound or the other.
             if (terms_.delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
         }
@@ -518,11 +532,31 @@ private:
         return checked(mode_of(next));
     }
 
+    /// Whether the pairs marked inside in `at` lie on these branches by more than rounding.
+    [[nodiscard]] bool fits_clearly(const LinearInequality<M>& inequality, const Branches& at,
+                                    const Branches& branches) const
+    {
+        Reaction r, rate;
+        if (!inequality.solve_on(branches, r, rate)) return false;
+        for (Eigen::Index i = 0; i < count(); ++i) {
+            if (at[i] != Branch::inside) continue;
+            const double terms = inequality.terms(i, r);
+            const double size =
+                branches[i] == Branch::inside
+                    ? std::max(std::abs(r[i]), terms / std::abs(terms_.delassus(i, i)))
+                    : terms;
+            if (!(inequality.slack(i, branches[i], r[i], rate[i]) > negligible * size))
+                return false;
+        }
+        return true;
+    }
+
     /// Rounding of the terms of a rate or a reaction: 64 units in the last place.
     static constexpr double negligible = 64 * std::numeric_limits<double>::epsilon();
 
     Matrices matrices_;
     BranchTerms<N, M> terms_;
+    bool is_unique_ = true;  ///< all principal minors of W are positive
     typename Inclusion::Flow::Function flow_ = nullptr;
 };
 
@@ -564,6 +598,30 @@ Mode AnyModes<N, M>::mode_after(StateWithReaction<N, M>& end, double error) cons
     }
     hold(held, end.t, end.w);
     return settle(held, end.t, end.w);
+}
+
+template <int N, int M>
+std::size_t AnyModes<N, M>::undetermined(const Branches& at, double t, const Vector& w) const
+{
+    if (is_unique_ || mask_of(mode_of(at)) == 0) return no_reaction;
+    LinearInequality<M> inequality;
+    state(at, t, w, inequality);
+    Branches found, branches;
+    bool any = false;
+    for (Mode b = 0; b < branch_modes; ++b) {
+        branches = branches_of(b);
+        bool allowed = true;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            allowed = allowed && (at[i] == Branch::inside || branches[i] == at[i]);
+        }
+        if (!allowed || !fits_clearly(inequality, at, branches)) continue;
+        for (Eigen::Index i = 0; any && i < count(); ++i) {
+            if (branches[i] != found[i]) return static_cast<std::size_t>(i);
+        }
+        found = branches;
+        any = true;
+    }
+    return no_reaction;
 }
 
 template <int N, int M>

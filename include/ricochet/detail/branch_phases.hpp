@@ -78,6 +78,8 @@ public:
     /// What a reaction alone does to the state that it acts on: it moves x by -y / W_ii along the
     /// reaction, so that y_i is zero. False where it has no influence on its y.
     [[nodiscard]] virtual bool move_onto(std::size_t i, double t, double* x) const = 0;
+    /// Moves x along row i of E, so that y_i grows by `amount`.
+    virtual void shift(std::size_t i, double amount, double* x) const = 0;
     /// The bounds; false where they form no interval.
     virtual bool bounds(double t, const double* x, double* lower, double* upper) const = 0;
     /// Whether a load, a bound or an offset jumps between the double before t and t.
@@ -96,6 +98,8 @@ public:
     /// See `AnyModes::arrive`.
     [[nodiscard]] virtual Mode arrive(Mode at, double t, double* x) const = 0;
     virtual void hold(Mode at, double t, double* x) const = 0;
+    /// See `AnyModes::undetermined`; `no_reaction` where there is none.
+    [[nodiscard]] virtual std::size_t undetermined(Mode at, double t, const double* x) const = 0;
 
     // --- explicit phases ---
 

@@ -84,6 +84,12 @@ public:
         write(w, x, size());
         return true;
     }
+    void shift(std::size_t i, double amount, double* x) const override
+    {
+        const auto& row = matrices().observe().row(index(i));
+        const double square = row.squaredNorm();
+        for (std::size_t c = 0; c < size(); ++c) x[c] += amount / square * row[index(c)];
+    }
     bool bounds(double t, const double* x, double* lower, double* upper) const override
     {
         Reaction least, most;
@@ -149,6 +155,11 @@ public:
         Vector w = vector(x);
         modes_.hold(Modes::branches_of(at), t, w);
         write(w, x, size());
+    }
+
+    [[nodiscard]] std::size_t undetermined(Mode at, double t, const double* x) const override
+    {
+        return modes_.undetermined(Modes::branches_of(at), t, vector(x));
     }
 
     // --- explicit phases ---

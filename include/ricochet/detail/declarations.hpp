@@ -581,7 +581,8 @@ template <class System>
 constexpr bool has_flow_alone()
 {
     static_assert(
-        !requires(const System& system) { system.set_valued(); },
+        !requires(const System& system) { system.set_valued(); } &&
+            !requires(const System& system) { system.set_valued(Mode{}); },
         "ricochet: found a system with set_valued(); expected the target to link "
         "ricochet::nonsmooth, ricochet/nonsmooth/hand_over.hpp to be included, and a "
         "call of integrate or Simulation, which alone follow an inclusion");
@@ -744,7 +745,8 @@ constexpr bool check_system()
                       "the flow takes");
     } else {
         static_assert(check_declarations<System, X>());
-        static_assert(!SpeltWell<NearNamesTwice<System>> || flow_declaration<System, X>() != Declaration::absent,
+        static_assert(!SpeltWell<NearNamesTwice<System>> ||
+                          flow_declaration<System, X>() != Declaration::absent,
                       "ricochet: found no flow that fits the state; expected void flow([Mode,] "
                       "double t, const State& x, State& dxdt) const");
     }

@@ -19,10 +19,15 @@ namespace ricochet::detail {
 template <class C>
 struct PhasedSetup {
     RunSetup<C> user;  ///< of the system without its inclusion
-    Owner<BranchPhases> inclusion;
+    /// One for each mode, or null; or one for all modes.
+    std::vector<Owner<BranchPhases>> inclusions;
+    bool by_mode = false;
     MethodName method = MethodName::dopri5;  ///< of the explicit phases
-    /// The mode in which a system with modes continues by itself from (t, x); null without modes.
-    Mode (*start_mode)(void* door, double t, const C& x) = nullptr;
+    /// The mode in which a system continues by itself from (t, x); null if its mode stays.
+    Mode (*start_mode)(void* door, Mode mode, double t, const C& x) = nullptr;
+    /// The reset of a stick, a slip or a mode; null if there is none.
+    Mode (*change)(void* door, std::size_t reaction, EventKind kind, Mode mode, double t,
+                   C& x) = nullptr;
 };
 
 /// A run in phases.
@@ -40,6 +45,10 @@ public:
     [[nodiscard]] virtual HandOverStatistics statistics(const Run<C>& run) const = 0;
     [[nodiscard]] virtual const StageReport& failure() const noexcept = 0;
 };
+
+/// What solves the inclusion of a run with these options.
+/// @throws std::invalid_argument for options that a run with phases does not have.
+[[nodiscard]] BranchPhasesOptions branch_options(const Options& options);
 
 /// @throws std::invalid_argument for options that a run with phases does not have, and for a start
 /// from which no reaction follows.

@@ -43,6 +43,9 @@ enum class Crossing {
 /// derivative along the flow. On a plateau all of these vanish, and the side is still open.
 enum class Side { below, plateau, above };
 
+/// `Event::reaction` of an event that changes no reaction.
+inline constexpr std::size_t no_reaction = static_cast<std::size_t>(-1);
+
 /// Properties of a guard that a system declares.
 struct GuardInfo {
     std::string_view name{};
@@ -58,6 +61,10 @@ struct GuardInfo {
     /// beyond its surface there, or on it and does not move inside. Not for `Crossing::either`.
     bool at_start = false;
     bool at_entry = false;
+    /// Of a system with set_valued(): the reaction that is asked where events of this guard
+    /// accumulate, press or contradict one another, or leave it on its surface with y at rest. Its
+    /// y is the guard, or the guard's rate; found where it is the guard and none is named.
+    std::size_t reaction = no_reaction;
 };
 
 /// The side that a value lies on; plateau for zero.
@@ -125,9 +132,6 @@ enum class EventKind : std::uint8_t {
 
 /// `Event::guard` of an event without a guard.
 inline constexpr std::size_t no_guard = static_cast<std::size_t>(-1);
-
-/// `Event::reaction` of an event that changes no reaction.
-inline constexpr std::size_t no_reaction = static_cast<std::size_t>(-1);
 
 /// `Run::other_guard` where the reset of a time event contradicts that of a guard.
 inline constexpr std::size_t time_event_reset = static_cast<std::size_t>(-2);

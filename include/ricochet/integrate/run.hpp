@@ -48,9 +48,12 @@ enum class Outcome {
     stalled,               ///< steps hardly advanced the time, or an endless run met no end
     stopped_by_callback,   ///< a function of the system reported an error, see `ricochet.h`
     at_rest,               ///< of a fault: nothing moves or will move again; the end is reached
-    not_handed_over,       ///< a set-valued phase was due, with `HandOverOptions::events_only`
+    not_handed_over,       ///< a set-valued phase was due, with `HandOverOptions::events_only`, or
+                           ///< no reaction within its bounds goes with y there
     released,              ///< no reaction is held any more, with `HandOverOptions::until_released`
-    law_violated,          ///< a set-valued step ended with a reaction that contradicts its y
+    law_violated,          ///< a set-valued step ended with a reaction that contradicts its y, or
+                           ///< the flow is another one than that of the inclusion which takes over
+    several,               ///< several motions satisfy the law of the reactions at one state
     running,               ///< only of a set-valued motion: it has not ended yet
 };
 

@@ -20,6 +20,7 @@
 #include <type_traits>
 
 #include "ricochet/detail/event_loop.hpp"
+#include "ricochet/detail/given_inclusion.hpp"
 #include "ricochet/detail/hand_over_run.hpp"
 #include "ricochet/detail/hand_over_watches.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
@@ -120,8 +121,13 @@ namespace ricochet {
 //
 // A system with a flow and guards of its own may declare
 //
-//     set_valued()         an Inclusion (inclusion.hpp) of the same state
-//     start_mode(t, x)     if it has modes: the mode in which it continues from (t, x)
+//     set_valued()         an Inclusion (inclusion.hpp) of the same state; or, with modes,
+//     set_valued(mode)     one for each mode, or a std::optional that is empty where a mode has
+//     none start_mode(mode, t, x)  the mode in which its own flow continues from (t, x) after the
+//                          inclusion of `mode`; also start_mode(t, x). By default `mode`, which
+//                          only set_valued(mode) allows
+//     change(k, kind, mode, t, x)  the reset of a stick, slip or mode of reaction k: may change x,
+//                          and returns the next mode; without modes void change(k, kind, t, x)
 //
 // The loop then follows the system's own flow while every y is clear of zero, farther from it than
 // 1000 (atol + rtol |w|) over the components that y reads, and the inclusion elsewhere: at the
@@ -140,9 +146,9 @@ namespace ricochet {
 // Inclusions without events of their own are given to `integrate` directly.
 
 template <class System>
-concept KnowsInclusion = requires(const System& system)
+concept KnowsInclusion = requires
 {
-    requires Inclusion<std::remove_cvref_t<decltype(system.set_valued())>>;
+    requires Inclusion<detail::InclusionOf<System>>;
 };
 
 /// Result of a run. A `stick`, `mode` or `touch` has the lowest guard that stands for the reaction
@@ -217,8 +223,14 @@ template <KnowsInclusion System, class X, class Stepping = ErrorControlled<Dopri
           class Detector = Extremum, class Locator = Newton>
 class EventHandOver {
 public:
-    using Set = std::remove_cvref_t<decltype(std::declval<const System&>().set_valued())>;
+    using Set = detail::InclusionOf<System>;
     using Vector = StateOf<Set>;
+    static_assert(detail::check_set_valued<System, X>());
+    static_assert(!detail::has_inclusion_by_mode<System>,
+                  "ricochet: found set_valued(mode) in a system that the loop cannot follow; "
+                  "expected sets that are boxes of at most four reactions, a state of fixed size, "
+                  "ErrorControlled<Method> with a method of the library, and Extremum, Ends or "
+                  "Bernstein");
 
     EventHandOver(const System& system, const X& x0, const Options& options,
                   const Stepping& stepping, const Detector& detector, const Locator& locator)
@@ -228,10 +240,6 @@ public:
           hand_over_(detail::completed(hand_over_options(options), false)),
           parts_(system, x0, stepping, detector, locator)
     {
-        static_assert(
-            !Moded<System, X> || requires(Mode & mode) { mode = system.start_mode(0.0, x0); },
-            "ricochet: found a system with modes and set_valued(); expected Mode "
-            "start_mode(double t, const State& x) const as well, the mode after it");
         static_assert(!TimedByState<System, X>,
                       "ricochet: found next_time_event([mode,] t, x) and set_valued(); expected "
                       "next_time_event(t), Times time_events, or a guard");
@@ -350,7 +358,7 @@ private:
             run_.outcome = Outcome::not_handed_over;
             return true;
         }
-        if constexpr (Moded<System, X>) run_.mode = system_.start_mode(run_.t, run_.x);
+        run_.mode = start_mode();
         return false;
     }
 
@@ -396,6 +404,18 @@ private:
         return stops && goes_on && run_.t == due;
     }
 
+    /// The mode in which the system continues from here.
+    [[nodiscard]] Mode start_mode() const
+    {
+        if constexpr (detail::StartsInMode<System, X>) {
+            return system_.start_mode(run_.mode, run_.t, run_.x);
+        } else if constexpr (detail::StartsMode<System, X>) {
+            return system_.start_mode(run_.t, run_.x);
+        } else {
+            return run_.mode;
+        }
+    }
+
     // --- time events while the inclusion is followed ---
 
     /// The next time event; infinite if there is none.
@@ -425,8 +445,7 @@ private:
         event.guard = no_guard;
         event.before = event.after = run_.x;
         event.bracket = {t, t};
-        Mode mode = run_.mode;
-        if constexpr (Moded<System, X>) mode = system_.start_mode(t, run_.x);
+        const Mode mode = start_mode();
         event.mode_before = mode;
         bool stops = false;
         try {
@@ -515,7 +534,7 @@ template <class System, class X, class Stepping, class Detector>
 [[nodiscard]] consteval bool runs_in_phases()
 {
     if constexpr (KnowsInclusion<System>) {
-        using Set = std::remove_cvref_t<decltype(std::declval<const System&>().set_valued())>;
+        using Set = InclusionOf<System>;
         using Method = typename Stepping::method;
         if constexpr (Branching<Set> && std::is_same_v<Stepping, ErrorControlled<Method>>) {
             return static_cast<int>(fixed_size<X>()) == state_size<Set> &&
@@ -532,17 +551,13 @@ template <class System, class X, class Stepping, class Detector>
 template <class System, class X, class Stepping, class Detector>
 requires(KnowsInclusion<System>) class LoopOf<System, X, Stepping, Detector> {
     using C = CoreState<X>;
-    using Set = std::remove_cvref_t<decltype(std::declval<const System&>().set_valued())>;
+    using Set = InclusionOf<System>;
+    static_assert(check_set_valued<System, X>());
     static_assert(runs_in_phases<System, X, Stepping, Detector>(),
                   "ricochet: found a Simulation of a system with set_valued() that the loop cannot "
                   "follow; expected sets that are boxes of at most four reactions, a state of "
                   "fixed size, ErrorControlled<Method> with a method of the library, and Extremum, "
                   "Ends or Bernstein; or integrate");
-    static_assert(
-        !Moded<System, X> || requires(const System& system, Mode& mode,
-                                      const X& x) { mode = system.start_mode(0.0, x); },
-        "ricochet: found a system with modes and set_valued(); expected Mode "
-        "start_mode(double t, const State& x) const as well, the mode after it");
 
 public:
     LoopOf() = default;
@@ -561,21 +576,57 @@ private:
     {
         constexpr int N = solver_components<state_size<Set>, reaction_size<Set>>;
         constexpr int M = solver_reactions<state_size<Set>, reaction_size<Set>>;
-        const HandOverOptions of = completed(options_of_phases(options), false);
         PhasedSetup<C> out;
         out.user = parts.setup();
-        out.inclusion = make_branch_phases<N, M>(solver_inclusion(Set(system.set_valued())),
-                                                 {.scheme = of.set_valued.scheme,
-                                                  .step = of.set_valued.step,
-                                                  .event_tolerance = of.event_tolerance});
+        const BranchPhasesOptions solving = branch_options(options);
+        out.by_mode = has_inclusion_by_mode<System>;
+        for_each_inclusion(system, modes_with_inclusions(system), [&](const Set* set) {
+            Owner<BranchPhases> phases;
+            if (set) phases = make_branch_phases<N, M>(solver_inclusion(Set(*set)), solving);
+            out.inclusions.push_back(std::move(phases));
+        });
         out.method = parts.method_name();
-        if constexpr (Moded<System, X>) {
-            out.start_mode = [](void* door, double t, const C& x) -> Mode {
+        set_modes(out);
+        return out;
+    }
+    [[nodiscard]] static std::size_t modes_with_inclusions(const System& system)
+    {
+        if constexpr (!has_inclusion_by_mode<System>) return 1;
+        constexpr std::size_t most = 4096;
+        const std::size_t modes = mode_count_of(system);
+        if (modes == 0 || modes > most) {
+            refuse_inclusion("set_valued(mode) goes with a mode_count of 1 to 4096, not",
+                             static_cast<double>(modes));
+        }
+        return modes;
+    }
+    static void set_modes(PhasedSetup<C>& out)
+    {
+        if constexpr (StartsInMode<System, X>) {
+            out.start_mode = [](void* door, Mode mode, double t, const C& x) -> Mode {
+                auto& of = *static_cast<Door<System, X>*>(door);
+                return of.system().start_mode(mode, t, of.read(x, 0));
+            };
+        } else if constexpr (StartsMode<System, X>) {
+            out.start_mode = [](void* door, Mode, double t, const C& x) -> Mode {
                 auto& of = *static_cast<Door<System, X>*>(door);
                 return of.system().start_mode(t, of.read(x, 0));
             };
         }
-        return out;
+        if constexpr (ChangesMode<System, X> || ChangesState<System, X>) {
+            out.change = [](void* door, std::size_t reaction, EventKind kind, Mode mode, double t,
+                            C& x) -> Mode {
+                auto& of = *static_cast<Door<System, X>*>(door);
+                return of.edit(x, [&](X& state) -> Mode {
+                    if constexpr (ChangesMode<System, X>) {
+                        return of.system().change(reaction, kind, mode, t, state);
+                    } else {
+                        of.system().change(reaction, kind, t, state);
+                        return mode;
+                    }
+                });
+            };
+        }
     }
 
     Owner<PhasedRun<C>> run_;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bindings/c/error.hpp"
+#include "bindings/c/inclusion.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/hybrid/system.hpp"
 #include "ricochet/ricochet.h"
@@ -199,6 +200,27 @@ public:
         return bound(at_.upper_bound, "upper_bound", which, mode, t, x);
     }
 
+    /// The set-valued motion, if there is one.
+    [[nodiscard]] const InclusionCallbacks* inclusion() const noexcept
+    {
+        return inclusion_ ? &*inclusion_ : nullptr;
+    }
+    template <class X>
+    [[nodiscard]] Mode start_mode(Mode mode, double t, const X& x) const
+    {
+        heed(inclusion_->callbacks().start_mode(at_.user, &mode, t, x.data(), x.size()),
+             "start_mode", t);
+        return mode;
+    }
+    template <class X>
+    [[nodiscard]] Mode change(std::size_t reaction, EventKind kind, Mode mode, double t, X& x) const
+    {
+        heed(inclusion_->callbacks().change(at_.user, reaction, static_cast<std::int32_t>(kind),
+                                            &mode, t, x.data(), x.size()),
+             "change", t);
+        return mode;
+    }
+
     /// A parameter that gates are trained for.
     [[nodiscard]] std::optional<double> parameter(std::string_view name) const;
 
@@ -218,6 +240,7 @@ private:
     }
 
     rc_callbacks at_;
+    std::optional<InclusionCallbacks> inclusion_;
     std::vector<std::string> guard_names_;
     std::vector<GuardInfo> infos_;
     std::vector<double> lipschitz_;

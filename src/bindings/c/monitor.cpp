@@ -121,6 +121,11 @@ rc_status rc_monitor_new(const rc_system* system, const rc_monitor_options* opti
         if (!monitor) throw_null("rc_monitor_new, monitor");
         *monitor = nullptr;
         check_handle(system, Kind::system);
+        if (system->system->inclusion()) {
+            throw Refusal(RC_INVALID,
+                          "rc_monitor_new: found a system with set_valued; a monitor cannot "
+                          "follow it, expected rc_simulation_new");
+        }
         const auto read = read_options(options);
         require_memory(system->system->dimension());
         *monitor = new rc_monitor(system->system, read);

@@ -176,6 +176,28 @@ RunOptions read_options(const rc_options* given)
     return run;
 }
 
+void require_options_of_phases(const RunOptions& options)
+{
+    const Reader reader("rc_options");
+    if (options.fixed_step) {
+        reader.refuse("found fixed_step = 1 and a system with set_valued; expected error control");
+    }
+    if (options.finders.detector > RC_BERNSTEIN) {
+        reader.refuse(
+            "detector: found one that defers checks and a system with set_valued; expected "
+            "RC_EXTREMUM, RC_ENDS or RC_BERNSTEIN");
+    }
+}
+
+MethodName method_of_phases(rc_method method)
+{
+    switch (method) {
+        case RC_FEHLBERG78: return MethodName::fehlberg78;
+        case RC_CASH_KARP54: return MethodName::cash_karp54;
+        default: return MethodName::dopri5;
+    }
+}
+
 MonitorOptions read_options(const rc_monitor_options* given)
 {
     const Reader reader("rc_monitor_options");

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "bindings/c/error.hpp"
+#include "ricochet/integrate/methods.hpp"
 #include "ricochet/integrate/options.hpp"
 
 namespace ricochet::c {
@@ -31,6 +32,10 @@ struct MonitorOptions {
 
 /// @throws Refusal naming the option.
 [[nodiscard]] RunOptions read_options(const rc_options* given);
+/// @throws Refusal for an option that no run with set-valued motion has.
+void require_options_of_phases(const RunOptions& options);
+/// The name of a method with error control.
+[[nodiscard]] MethodName method_of_phases(rc_method method);
 /// Null: the defaults.
 /// @throws Refusal or std::invalid_argument naming the option.
 [[nodiscard]] MonitorOptions read_options(const rc_monitor_options* given);

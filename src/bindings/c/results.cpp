@@ -16,6 +16,8 @@ namespace ricochet::c {
 static_assert(static_cast<int>(EventKind::accumulation) == RC_ACCUMULATION &&
               static_cast<int>(EventKind::mode) == RC_MODE &&
               static_cast<int>(EventKind::jump) == RC_JUMP);
+static_assert(static_cast<int>(EventKind::stick) == RC_STICK &&
+              static_cast<int>(EventKind::slip) == RC_SLIP && no_reaction == RC_NO_REACTION);
 static_assert(no_guard == RC_NO_GUARD && time_event_reset == RC_TIME_EVENT_RESET);
 
 void write_event(rc_event* event, const ShownEvent& from)
@@ -33,8 +35,19 @@ void write_event(rc_event* event, const ShownEvent& from)
                   .bracket_lo = from.bracket.lo,
                   .bracket_hi = from.bracket.hi,
                   .slope = from.slope,
-                  .error = from.error},
+                  .error = from.error,
+                  .reaction = from.reaction},
                  "rc_event");
+}
+
+void write_phase(rc_phase* phase, const ShownPhase& from)
+{
+    write_struct(phase,
+                 {.size = sizeof *phase,
+                  .from = from.from,
+                  .set_valued = from.set_valued,
+                  .cause = from.cause},
+                 "rc_phase");
 }
 
 void write_statistics(rc_statistics* statistics, const Counts& counts)

@@ -21,6 +21,7 @@ struct ShownEvent {
     Bracket bracket;
     double slope = 0, error = 0;
     bool late = false;
+    std::size_t reaction = no_reaction;
 };
 
 template <class X>
@@ -36,8 +37,16 @@ template <class X>
             .bracket = event.bracket,
             .slope = event.slope,
             .error = event.error,
-            .late = event.late};
+            .late = event.late,
+            .reaction = event.reaction};
 }
+
+/// A phase of a run with set-valued motion.
+struct ShownPhase {
+    double from = 0;
+    bool set_valued = false;
+    int cause = 0;
+};
 
 struct Counts {
     Statistics statistics;
@@ -46,6 +55,7 @@ struct Counts {
 
 // All of these throw Refusal if the struct is invalid.
 void write_event(rc_event* event, const ShownEvent& from);
+void write_phase(rc_phase* phase, const ShownPhase& from);
 void write_statistics(rc_statistics* statistics, const Counts& from);
 void write_failure(rc_callback_error* error, const CallbackFailed& from);
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "bindings/c/callback_setup.hpp"
+#include "bindings/c/phased.hpp"
 #include "bindings/c/run.hpp"
 #include "ricochet/detail/kernels.hpp"
 #include "ricochet/integrate/methods.hpp"
@@ -21,10 +22,15 @@ template <class X>
 class RunOf final : public AnyRun {
 public:
     RunOf(std::shared_ptr<const CallbackSystem> system, const X& x0, const RunOptions& options)
-        : callbacks_(std::move(system), x0, options.finders),
-          loop_(detail::make_loop(setup_of(x0.size(), options), x0, options.options)),
-          like_(x0)
+        : callbacks_(system, x0, options.finders), like_(x0)
     {
+        if (system->inclusion()) {
+            phased_ = make_phased(system, setup_of(x0.size(), options), x0, options);
+            loop_ = &phased_->loop();
+        } else {
+            own_ = detail::make_loop(setup_of(x0.size(), options), x0, options.options);
+            loop_ = own_.operator->();
+        }
     }
 
     bool step() override { return finished(loop_->step()); }
@@ -89,6 +95,11 @@ public:
     {
         return loop_->run().solution.mode(t);
     }
+    [[nodiscard]] const std::vector<ShownPhase>& phases() override
+    {
+        shown_phases_ = phased_ ? shown_phases(*phased_) : std::vector<ShownPhase>();
+        return shown_phases_;
+    }
     [[nodiscard]] std::string save() override { return to_text(loop_->save()); }
     void restore(std::string_view text) override
     {
@@ -135,7 +146,10 @@ private:
     }
 
     CallbackSetup<X> callbacks_;
-    detail::Owner<detail::AnyLoop<X>> loop_;
+    detail::Owner<detail::AnyLoop<X>> own_;  ///< null with set-valued motion
+    detail::Owner<detail::PhasedRun<X>> phased_;
+    detail::AnyLoop<X>* loop_ = nullptr;  ///< of either
+    std::vector<ShownPhase> shown_phases_;
     X like_;
 };
 

@@ -84,7 +84,8 @@ void require_solution(const rc_simulation& at, double t)
 
 [[nodiscard]] bool is_outcome(int code) noexcept
 {
-    return code >= 0 && code <= RC_STOPPED_BY_CALLBACK;
+    return (code >= 0 && code <= RC_STOPPED_BY_CALLBACK) || code == RC_NOT_HANDED_OVER ||
+           code == RC_LAW_VIOLATED || code == RC_SEVERAL;
 }
 
 static_assert(static_cast<int>(Outcome::reached_end) == RC_REACHED_END &&
@@ -92,7 +93,10 @@ static_assert(static_cast<int>(Outcome::reached_end) == RC_REACHED_END &&
               static_cast<int>(Outcome::non_finite) == RC_NON_FINITE &&
               static_cast<int>(Outcome::cancelled) == RC_CANCELLED &&
               static_cast<int>(Outcome::stalled) == RC_STALLED &&
-              static_cast<int>(Outcome::stopped_by_callback) == RC_STOPPED_BY_CALLBACK);
+              static_cast<int>(Outcome::stopped_by_callback) == RC_STOPPED_BY_CALLBACK &&
+              static_cast<int>(Outcome::not_handed_over) == RC_NOT_HANDED_OVER &&
+              static_cast<int>(Outcome::law_violated) == RC_LAW_VIOLATED &&
+              static_cast<int>(Outcome::several) == RC_SEVERAL);
 
 }  // namespace
 
@@ -248,6 +252,21 @@ rc_status rc_event_at(rc_simulation* simulation, size_t index, rc_event* event)
     return with(simulation, [&](const rc_simulation& at) {
         require_index("event", index, at.run->events());
         write_event(event, at.run->event(index));
+    });
+}
+
+size_t rc_phase_count(rc_simulation* simulation)
+{
+    return value_of(simulation, std::size_t{0},
+                    [](rc_simulation& at) { return at.run->phases().size(); });
+}
+
+rc_status rc_phase_at(rc_simulation* simulation, size_t index, rc_phase* phase)
+{
+    return with(simulation, [&](rc_simulation& at) {
+        const auto& phases = at.run->phases();
+        require_index("phase", index, phases.size());
+        write_phase(phase, phases[index]);
     });
 }
 

@@ -137,12 +137,17 @@ CallbackSystem::CallbackSystem(const rc_callbacks& given)
         times = every(given.time_event_period, given.time_event_phase,
                       "rc_callbacks.time_event_period");
     }
+    if (given.set_valued) inclusion_.emplace(given.set_valued, given);
+    at_.set_valued = nullptr;
     const std::size_t count = given.guard_count;
     infos_.resize(count);
     guard_names_.resize(count);
     lipschitz_.assign(count, 1.0);
     const auto* bytes = reinterpret_cast<const unsigned char*>(given.guard_infos);
     at_.guard_infos = nullptr;
+    for (std::size_t i = 0; i < count && inclusion_; ++i) {
+        infos_[i].reaction = inclusion_->reaction_of(i);
+    }
     if (!bytes || count == 0) return;
     const std::size_t stride = size_of_given<rc_guard_info>(bytes, "rc_guard_info");
     for (std::size_t i = 0; i < count; ++i) {
@@ -152,6 +157,7 @@ CallbackSystem::CallbackSystem(const rc_callbacks& given)
                                              ": its size is not that of the first");
         }
         infos_[i] = info_of(i, info);
+        if (inclusion_) infos_[i].reaction = inclusion_->reaction_of(i);
         if (info.name) guard_names_[i] = info.name;
         infos_[i].name = guard_names_[i];
         if (info.lipschitz > 0) lipschitz_[i] = info.lipschitz;

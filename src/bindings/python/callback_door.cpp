@@ -11,6 +11,7 @@
 #include "formula_door.hpp"
 #include "numbers.hpp"
 #include "ricochet/detail/guard_view.hpp"
+#include "ricochet/detail/sized_inclusion.hpp"
 
 namespace ricochet::python {
 
@@ -30,6 +31,12 @@ public:
     [[nodiscard]] const Table& table() const noexcept override { return source_.table_; }
     [[nodiscard]] void* door() noexcept override { return this; }
     [[nodiscard]] bool is_free() const noexcept override { return source_.free_; }
+    [[nodiscard]] bool has_inclusion() const noexcept override
+    {
+        return source_.inclusion_.has_value();
+    }
+    void add_inclusions(detail::PhasedSetup<State>& setup, std::size_t n,
+                        const Options& options) override;
 
     static void fill(Table& table, const CallbackSource& source)
     {
@@ -142,6 +149,8 @@ public:
     }
 
 private:
+    class Inclusion;
+
     template <class Any>
     static void fill_bounds(Table& table, const Any& any)
     {
@@ -470,6 +479,24 @@ private:
         numbers.copy(x.data());
     }
 
+    /// The mode in which the system's own flow is followed again.
+    [[nodiscard]] Mode mode_after(Mode mode, double t, const State& x)
+    {
+        const Ref result = call(source_.inclusion_->start_mode, mode, t, x_.show(x));
+        State same = x;
+        return take_place(result.get(), "start_mode of set_valued", no_guard_, mode, same);
+    }
+    /// The reset of a change of a reaction, called with its number and kind behind the state.
+    [[nodiscard]] Mode change(std::size_t reaction, EventKind kind, Mode mode, double t, State& x)
+    {
+        const Ref which = checked(PyLong_FromSize_t(reaction));
+        const Ref what = checked(PyUnicode_FromString(ricochet::name(kind).data()));
+        const Ref result =
+            call(source_.inclusion_->change, mode, t, x_.show(x), which.get(), what.get());
+        if (result.get() == Py_None) return mode;
+        return take_place(result.get(), "change of set_valued", no_guard_, mode, x);
+    }
+
     [[nodiscard]] double timer(Mode mode, double t, const State& x)
     {
         const Ref result = call(source_.next_time_event_at_, mode, t, x_.show(x));
@@ -496,6 +523,121 @@ private:
     std::vector<double> values_;
     const std::string no_guard_;
 };
+
+#ifdef RICOCHET_WITH_NONSMOOTH
+
+/// The inclusion of a system in one mode.
+class CallbackDoor::Inclusion final : public detail::SizedInclusion {
+public:
+    Inclusion(CallbackDoor& door, Mode mode, std::size_t size)
+        : door_(door), of_(*door.source_.inclusion_), mode_(mode), size_(size)
+    {
+    }
+
+    [[nodiscard]] std::size_t size() const noexcept override { return size_; }
+    [[nodiscard]] std::size_t reactions() const noexcept override { return of_.reactions; }
+    void smooth(double t, const double* w, double* f) const override
+    {
+        read(door_.call(of_.smooth, mode_, t, show(w)).get(), "smooth", size_, f);
+    }
+    void bounds(double t, const double* w, double* lower, double* upper) const override
+    {
+        const Ref result = door_.call(of_.bounds, mode_, t, show(w));
+        if (!PyTuple_Check(result.get()) || PyTuple_GET_SIZE(result.get()) != 2) {
+            raise(PyExc_TypeError, "bounds of set_valued returned " + type_of(result.get()) +
+                                       ", expected a tuple (lower, upper)");
+        }
+        read(PyTuple_GET_ITEM(result.get(), 0), "lower bounds", reactions(), lower);
+        read(PyTuple_GET_ITEM(result.get(), 1), "upper bounds", reactions(), upper);
+    }
+    void offset(double t, double* s, double* rate) const override
+    {
+        if (of_.offset) read(door_.call(of_.offset, mode_, t).get(), "offset", reactions(), s);
+        if (of_.offset_rate) {
+            read(door_.call(of_.offset_rate, mode_, t).get(), "offset_rate", reactions(), rate);
+        }
+    }
+    [[nodiscard]] const double* mass() const noexcept override { return data(of_.mass); }
+    [[nodiscard]] const double* observe() const noexcept override { return data(of_.observe); }
+    [[nodiscard]] const double* act() const noexcept override { return data(of_.act); }
+
+private:
+    [[nodiscard]] static const double* data(const std::vector<double>& matrix) noexcept
+    {
+        return matrix.empty() ? nullptr : matrix.data();
+    }
+    [[nodiscard]] PyObject* show(const double* w) const
+    {
+        door_.there_.assign(w, w + size_);
+        return door_.x_.show(door_.there_);
+    }
+    /// Writes `count` numbers; a number alone is an array of one.
+    static void read(PyObject* result, const char* what, std::size_t count, double* out)
+    {
+        static const std::string of = " of set_valued";
+        if (PyFloat_Check(result) || PyLong_Check(result)) {
+            if (count == 1) return static_cast<void>(*out = as_guard(result, what + of));
+        }
+        const Numbers numbers(result, what, of);
+        if (numbers.size() != count) {
+            raise(PyExc_ValueError, what + of + " returned " + std::to_string(numbers.size()) +
+                                        " numbers, expected " + std::to_string(count));
+        }
+        numbers.copy(out);
+    }
+
+    CallbackDoor& door_;
+    const CallbackInclusion& of_;
+    Mode mode_;
+    std::size_t size_;
+};
+
+void CallbackDoor::add_inclusions(detail::PhasedSetup<State>& setup, std::size_t n,
+                                  const Options& options)
+{
+    const CallbackInclusion& of = *source_.inclusion_;
+    if (of.components != 0 && of.components != n) {
+        throw std::invalid_argument("set_valued: found matrices for " +
+                                    std::to_string(of.components) + " components, expected " +
+                                    std::to_string(n) + ", those of x0");
+    }
+    if (of.observe.empty() && of.reactions > n) {
+        throw std::invalid_argument("set_valued: found " + std::to_string(of.reactions) +
+                                    " reactions of " + std::to_string(n) +
+                                    " components and no observe, expected the matrix");
+    }
+    const detail::BranchPhasesOptions solving = detail::branch_options(options);
+    const std::size_t modes = source_.moded_ ? source_.mode_count_ : 1;
+    for (std::size_t mode = 0; mode < modes; ++mode) {
+        detail::Owner<detail::BranchPhases> phases;
+        if (of.in_mode.empty() || of.in_mode[mode]) {
+            phases = detail::make_branch_phases(
+                detail::Shared<const detail::SizedInclusion>::make<Inclusion>(
+                    *this, static_cast<Mode>(mode), n),
+                solving);
+        }
+        setup.inclusions.push_back(std::move(phases));
+    }
+    setup.by_mode = source_.moded_;
+    if (of.start_mode) {
+        setup.start_mode = [](void* door, Mode mode, double t, const State& x) {
+            return at(door).mode_after(mode, t, x);
+        };
+    }
+    if (of.change) {
+        setup.change = [](void* door, std::size_t reaction, EventKind kind, Mode mode, double t,
+                          State& x) { return at(door).change(reaction, kind, mode, t, x); };
+    }
+}
+
+#else
+
+void CallbackDoor::add_inclusions(detail::PhasedSetup<State>& /*setup*/, std::size_t /*n*/,
+                                  const Options& /*options*/)
+{
+}
+
+#endif
 
 void CallbackSource::fill_table()
 {

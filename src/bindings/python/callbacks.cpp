@@ -139,9 +139,13 @@ CallbackSource::CallbackSource(PyObject* specification)
         }
     }
 
+    if (const Ref inclusion = item(specification, "set_valued"); inclusion.get() != Py_None) {
+        read_inclusion(inclusion.get());
+    }
+
     const auto is_free = [](const Function& f) { return !f || f.address; };
     free_ = is_free(flow_) && !guard_values_ && !reset_set_ && !next_time_event_ &&
-            !next_time_event_at_ && !previous_time_event_ && is_free(time_reset_);
+            !next_time_event_at_ && !previous_time_event_ && is_free(time_reset_) && !inclusion_;
     for (const CallbackGuard& guard : guards_) {
         free_ = free_ && is_free(guard.value) && is_free(guard.rate) && is_free(guard.reset) &&
                 is_free(guard.rest) && !guard.enabled && is_free(guard.speed_bound) &&
@@ -200,14 +204,18 @@ void CallbackSource::read_guard(PyObject* specification)
         .touch = number_in(specification, "touch", 0),
         .at_start = truth_in(specification, "at_start"),
         .at_entry = truth_in(specification, "at_entry")};
+    guard.in_mode = modes_in(specification, guard.title);
+}
+
+std::vector<bool> CallbackSource::modes_in(PyObject* specification, const std::string& title) const
+{
     const Ref modes = item(specification, "in_modes");
-    if (modes.get() == Py_None) return;
+    if (modes.get() == Py_None) return {};
     if (!moded_) {
-        raise(PyExc_ValueError, guard.title +
-                                    ": found in_modes, expected none in a system "
-                                    "without modes");
+        raise(PyExc_ValueError,
+              title + ": found in_modes, expected none in a system without modes");
     }
-    guard.in_mode.assign(mode_count_, false);
+    std::vector<bool> in_mode(mode_count_, false);
     for (Py_ssize_t i = 0; i < PyList_GET_SIZE(modes.get()); ++i) {
         PyObject* number =
             PyDict_GetItemWithError(mode_numbers_.get(), PyList_GET_ITEM(modes.get(), i));
@@ -215,12 +223,56 @@ void CallbackSource::read_guard(PyObject* specification)
             PyErr_Clear();
             const Ref text = checked(PyObject_Repr(PyList_GET_ITEM(modes.get(), i)));
             const Ref known = checked(PyObject_Repr(mode_list_.get()));
-            raise(PyExc_ValueError, guard.title + ": found the mode " +
-                                        PyUnicode_AsUTF8(text.get()) +
+            raise(PyExc_ValueError, title + ": found the mode " + PyUnicode_AsUTF8(text.get()) +
                                         ", which the system does not have, expected some of " +
                                         PyUnicode_AsUTF8(known.get()));
         }
-        guard.in_mode[PyLong_AsSize_t(number)] = true;
+        in_mode[PyLong_AsSize_t(number)] = true;
+    }
+    return in_mode;
+}
+
+void CallbackSource::read_inclusion(PyObject* specification)
+{
+    CallbackInclusion& of = inclusion_.emplace();
+    const auto function = [&](const char* key) {
+        return Function(item(specification, key).get(), std::string(key) + " of set_valued");
+    };
+    of.smooth = function("smooth");
+    of.bounds = function("bounds");
+    of.offset = function("offset");
+    of.offset_rate = function("offset_rate");
+    of.change = function("change");
+    of.start_mode = function("start_mode");
+    const auto matrix = [&](const char* key) {
+        const Ref rows = item(specification, key);
+        std::vector<double> out;
+        if (rows.get() == Py_None) return out;
+        for (Py_ssize_t i = 0; i < PyList_GET_SIZE(rows.get()); ++i) {
+            out.push_back(PyFloat_AsDouble(PyList_GET_ITEM(rows.get(), i)));
+            if (PyErr_Occurred()) throw PythonError();
+        }
+        return out;
+    };
+    of.mass = matrix("mass");
+    of.observe = matrix("observe");
+    of.act = matrix("act");
+    of.components = static_cast<std::size_t>(number_in(specification, "components", 0));
+    of.reactions = static_cast<std::size_t>(number_in(specification, "reactions", 1));
+    of.in_mode = modes_in(specification, "set_valued");
+    const Ref stands_for = item(specification, "stands_for");
+    if (stands_for.get() == Py_None) return;
+    const auto count = static_cast<std::size_t>(PyList_GET_SIZE(stands_for.get()));
+    if (count != guards_.size()) {
+        raise(PyExc_ValueError, "stands_for of set_valued: found " + std::to_string(count) +
+                                    " of them, expected one for each of " +
+                                    std::to_string(guards_.size()) + " guards");
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+        PyObject* reaction = PyList_GET_ITEM(stands_for.get(), static_cast<Py_ssize_t>(i));
+        if (reaction == Py_None) continue;
+        guards_[i].info.reaction = PyLong_AsSize_t(reaction);
+        if (PyErr_Occurred()) throw PythonError();
     }
 }
 

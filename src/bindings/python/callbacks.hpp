@@ -59,6 +59,15 @@ struct CallbackGuard {
     std::vector<bool> in_mode;  ///< empty: in every mode
 };
 
+/// Set-valued motion: functions, and matrices by rows, which are empty where the default applies.
+struct CallbackInclusion {
+    Function smooth, bounds, offset, offset_rate, change, start_mode;
+    std::vector<double> mass, observe, act;
+    std::size_t components = 0;  ///< of the matrices; 0: none is given
+    std::size_t reactions = 1;
+    std::vector<bool> in_mode;  ///< empty: in every mode
+};
+
 class CallbackSource final : public Source {
 public:
     /// @param specification  a dictionary that `System` in Python makes
@@ -75,6 +84,10 @@ private:
     friend class CallbackDoor;
 
     void read_guard(PyObject* specification);
+    void read_inclusion(PyObject* specification);
+    /// Whether each mode is among those that a specification names; empty if it names none.
+    [[nodiscard]] std::vector<bool> modes_in(PyObject* specification,
+                                             const std::string& title) const;
     void fill_table();
 
     std::string name_;
@@ -83,6 +96,7 @@ private:
     Function next_time_event_, next_time_event_at_, previous_time_event_, time_reset_;
     std::optional<Times> times_;  ///< a list of time events, or a clock
     std::vector<CallbackGuard> guards_;
+    std::optional<CallbackInclusion> inclusion_;
     std::vector<Ref> arguments_;    ///< the user's further arguments of every function
     Ref mode_list_, mode_numbers_;  ///< names of the modes and their numbers; null without modes
     std::size_t mode_count_ = 0;

@@ -47,6 +47,11 @@ public:
     DoorSystem(const Source& source, const State& like)
         : source_(&source), door_(source.open(like)), table_(&door_->table())
     {
+        if (door_->has_inclusion()) {
+            throw std::invalid_argument(
+                "set_valued: found set-valued motion, expected none: a network cannot learn from "
+                "it");
+        }
         if (table_->next_time_event_at) {
             throw std::invalid_argument(
                 "next_time_event: found one that takes the state, expected next_time_event(t) or "

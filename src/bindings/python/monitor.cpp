@@ -110,6 +110,11 @@ public:
         start_mode_ = source_->start_mode();
         components_ = like.size();
         door_ = source_->open(like);
+        if (door_->has_inclusion()) {
+            throw std::invalid_argument(
+                "Monitor: found a system with set_valued, which a monitor cannot follow, expected "
+                "integrate or Simulation");
+        }
         // Guards see whole states: a host's interpolant need be no polynomial.
         table_ = door_->table();
         table_.guard_on = nullptr;

@@ -27,9 +27,17 @@ struct EventHead {
     std::uint32_t mode_after;
     std::uint8_t kind;
     bool late;
-    std::uint8_t unused[6];
+    std::uint8_t unused[2];
+    std::int32_t reaction;  ///< -1 if there is none
 };
 static_assert(sizeof(EventHead) == 64);
+
+/// A phase of a run with set-valued motion.
+struct PhaseRecord {
+    double from = 0;
+    bool set_valued = false;
+    std::string cause;
+};
 
 struct Record {
     Outcome outcome = Outcome::reached_end;
@@ -48,6 +56,7 @@ struct Record {
     std::string wrong_bound;                    ///< sentence about a violated bound
     std::string reason;                         ///< text of the `Stop` that ended the run
     std::vector<std::size_t> armed_beyond;      ///< guards that began beyond their surface
+    std::vector<PhaseRecord> phases;            ///< of a system with set-valued motion
 
     [[nodiscard]] std::size_t event_stride() const noexcept
     {
@@ -99,7 +108,8 @@ template <class X>
                              .mode_after = event.mode_after,
                              .kind = static_cast<std::uint8_t>(event.kind),
                              .late = event.late,
-                             .unused = {}};
+                             .unused = {},
+                             .reaction = static_cast<std::int32_t>(event.reaction)};
         std::memcpy(at, &head, sizeof head);
         double* states = at + sizeof(EventHead) / sizeof(double);
         put_state(event.before, out.width, states);

@@ -39,6 +39,7 @@ namespace {
     add("mode_after", "u4", offsetof(EventHead, mode_after));
     add("kind", "u1", offsetof(EventHead, kind));
     add("late", "?", offsetof(EventHead, late));
+    add("reaction", "i4", offsetof(EventHead, reaction));
     add("before", states, sizeof(EventHead));
     add("after", states, sizeof(EventHead) + 8 * width);
     return py::dtype(names, formats, offsets,
@@ -129,6 +130,15 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     return out;
 }
 
+[[nodiscard]] py::list listed(const std::vector<PhaseRecord>& phases)
+{
+    py::list out;
+    for (const PhaseRecord& phase : phases) {
+        out.append(py::make_tuple(phase.from, phase.set_valued, phase.cause));
+    }
+    return out;
+}
+
 [[nodiscard]] py::tuple pickled(const PyRun& self)
 {
     const Record& r = self.record;
@@ -137,7 +147,7 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         std::bit_cast<Counts>(r.statistics), r.width, r.event_count, bytes_of(r.events),
         bytes_of(r.times), bytes_of(r.states), r.wrong_bound,
         r.solution ? py::object(pickled(PySolution{r.solution})) : py::object(py::none()),
-        self.modes, self.guard_names, r.reason, r.armed_beyond);
+        self.modes, self.guard_names, r.reason, r.armed_beyond, listed(r.phases));
 }
 
 [[nodiscard]] PyRun run_from(const py::tuple& state)
@@ -166,6 +176,11 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     out.guard_names = py::cast<std::vector<std::string>>(state[15]);
     r.reason = py::cast<std::string>(state[16]);
     r.armed_beyond = py::cast<std::vector<std::size_t>>(state[17]);
+    for (const py::handle phase : py::cast<py::list>(state[18])) {
+        const py::tuple of = py::cast<py::tuple>(phase);
+        r.phases.push_back(
+            {py::cast<double>(of[0]), py::cast<bool>(of[1]), py::cast<std::string>(of[2])});
+    }
     return out;
 }
 
@@ -289,10 +304,7 @@ void bind_results(py::module_& module)
         .def_property_readonly(
             "message",
             [](const PyRun& self) {
-                std::string out(describe(self.record.outcome));
-                if (!self.record.reason.empty()) {
-                    out = detail::describe_reason(self.record.outcome, self.record.reason);
-                }
+                std::string out = detail::describe_run(self.record.outcome, self.record.reason, {});
                 const bool conflicts = self.record.outcome == Outcome::conflicting_resets;
                 if (conflicts) {
                     constexpr std::string_view in_cpp = "reset(fired, t, x)";
@@ -324,9 +336,12 @@ void bind_results(py::module_& module)
             "resets that declined.")
         .def_property_readonly(
             "reason", [](const PyRun& self) { return self.record.reason; },
-            "The text of the `Stop` that ended the run, the function that was not finite, or an "
-            "empty "
-            "text.")
+            "The text of the `Stop` that ended the run, a sentence about reactions that did, the "
+            "function that was not finite, or an empty text.")
+        .def_property_readonly(
+            "phases", [](const PyRun& self) { return listed(self.record.phases); },
+            "Of a system with set_valued: tuples of the time from which a phase lasts, whether "
+            "something is held or followed by implicit steps in it, and why it began.")
         .def_property_readonly(
             "success",
             [](const PyRun& self) {
@@ -373,7 +388,7 @@ void bind_results(py::module_& module)
             "events",
             [self_of](const py::object& self) { return events_of(self_of(self).record, self); },
             "The events, as a structured array with the fields t, guard, bracket, slope, error, "
-            "mode_before, mode_after, kind, late, before, after.")
+            "mode_before, mode_after, kind, late, reaction, before, after.")
         .def_property_readonly(
             "event_modes",
             [](const PyRun& self) {

@@ -4,6 +4,7 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/kernels.hpp"
@@ -72,6 +73,49 @@ void detect_without_gate(detail::RunSetup<State>& setup, const Request& request)
 std::unique_ptr<RunDoor> open_for(const Request& request, const Source& source, const State& x0)
 {
     return request.by_series ? source.open_by_series(x0) : source.open(x0);
+}
+
+RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunDoor& door, const State& x0)
+{
+    if (!door.has_inclusion()) {
+        own_ = detail::make_loop(setup.setup, x0, request.options);
+        loop_ = own_.operator->();
+        return;
+    }
+#ifdef RICOCHET_WITH_NONSMOOTH
+    if (request.fixed || request.by_series || request.method == MethodName::rk4 ||
+        request.method == MethodName::euler) {
+        throw std::invalid_argument(
+            "set_valued: found fixed steps or the method 'taylor' beside it, expected 'dopri5', "
+            "'fehlberg78' or 'cash-karp54' with error control");
+    }
+    const bool checks = request.detector == "extremum" || request.detector == "ends" ||
+                        request.detector == "bernstein";
+    if (!checks)
+        refuse("detector", request.detector, "'extremum', 'ends' or 'bernstein' beside set_valued");
+    detail::PhasedSetup<State> phases;
+    phases.user = setup.setup;
+    phases.method = request.method;
+    door.add_inclusions(phases, x0.size(), request.options);
+    phased_ = detail::make_phased_run(std::move(phases), x0, request.options);
+    loop_ = &phased_->loop();
+#else
+    throw std::invalid_argument(
+        "set_valued: found one, and a module that was built without set-valued motion, expected "
+        "RICOCHET_NONSMOOTH=ON");
+#endif
+}
+
+std::vector<PhaseRecord> RunLoop::phases() const
+{
+    std::vector<PhaseRecord> out;
+    if (!phased_) return out;
+#ifdef RICOCHET_WITH_NONSMOOTH
+    for (const Phase& phase : phased_->phases()) {
+        out.push_back({phase.from, phase.set_valued, std::string(ricochet::name(phase.cause))});
+    }
+#endif
+    return out;
 }
 
 OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door)

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "request.hpp"
 #include "ricochet/detail/core.hpp"
@@ -24,6 +25,25 @@ struct OwnedSetup {
 /// @throws std::invalid_argument for an unknown detector or locator, or a gate of a kind that the
 /// detector cannot use.
 [[nodiscard]] OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door);
+
+/// The loop of a run, which has phases if its system has set-valued motion.
+class RunLoop {
+public:
+    RunLoop() = default;
+    /// @throws std::invalid_argument as `make_loop`, and for options that no run with set-valued
+    /// motion has
+    RunLoop(const Request& request, const OwnedSetup& setup, RunDoor& door, const State& x0);
+
+    [[nodiscard]] explicit operator bool() const noexcept { return loop_ != nullptr; }
+    [[nodiscard]] detail::AnyLoop<State>& operator*() const noexcept { return *loop_; }
+    [[nodiscard]] detail::AnyLoop<State>* operator->() const noexcept { return loop_; }
+    [[nodiscard]] std::vector<PhaseRecord> phases() const;
+
+private:
+    detail::Owner<detail::AnyLoop<State>> own_;
+    detail::Owner<detail::PhasedRun<State>> phased_;
+    detail::AnyLoop<State>* loop_ = nullptr;
+};
 
 /// The same for the detectors that ask a gate. False: the request names another one.
 [[nodiscard]] bool detect_by_gate(OwnedSetup& out, const Request& request, const Source& source,

@@ -102,15 +102,17 @@ PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& r
     const OwnedSetup owned = setup_for(request, *source, *door);
     Trajectory<State> steps;
     Trajectory<State>* const kept = request.record_steps ? &steps : nullptr;
-    detail::Owner<Loop> loop;
+    RunLoop loop;
     try {
-        loop = detail::make_loop(owned.setup, x0, request.options);
+        loop = RunLoop(request, owned, *door, x0);
         work_freely(door->is_free(), [&] { drive(*loop, kept); });
     } catch (const PythonError& error) {
         out.record = loop ? record_of(loop->finish(), kept) : start_of(x0, request.options);
+        out.record.phases = loop.phases();
         raise_with(error, std::move(out));
     }
     out.record = record_of(loop->finish(), kept);
+    out.record.phases = loop.phases();
     if (door->watch().raised()) raise_with(*door->watch().raised(), std::move(out));
     return out;
 }
@@ -189,7 +191,7 @@ public:
         request.options.cancelled = door_->watch().cancelled();
         setup_ = setup_for(request, *source_, *door_);
         try {
-            loop_ = detail::make_loop(setup_.setup, x0, request.options);
+            loop_ = RunLoop(request, setup_, *door_, x0);
         } catch (const PythonError& error) {
             PyRun run = names_;
             run.record = start_of(x0, request.options);
@@ -216,6 +218,7 @@ public:
         if (!finished_) {
             finished_.emplace(names_);
             finished_->record = record_of(Run<State>(loop_->bring_up_to_date()));
+            finished_->record.phases = loop_.phases();
             may_go_on_ = true;
         }
         return *finished_;
@@ -226,6 +229,7 @@ public:
         if (!finished_) {
             finished_.emplace(names_);
             finished_->record = record_of(loop_->finish());
+            finished_->record.phases = loop_.phases();
         }
         may_go_on_ = false;
         return *finished_;
@@ -271,6 +275,7 @@ public:
         run.mode = loop_->mode();
         if (!loop_->ended()) run.outcome = Outcome::cancelled;
         out.record = record_of(std::move(run));
+        out.record.phases = loop_.phases();
         return out;
     }
 
@@ -325,6 +330,7 @@ private:
     {
         finished_.emplace(names_);
         finished_->record = record_of(loop_->finish());
+        finished_->record.phases = loop_.phases();
         raise_with(error, PyRun(*finished_));
     }
 
@@ -332,7 +338,7 @@ private:
     PyRun names_;
     std::unique_ptr<RunDoor> door_;
     OwnedSetup setup_;
-    detail::Owner<Loop> loop_;
+    RunLoop loop_;
     std::optional<PyRun> finished_;
     bool may_go_on_ = false;  ///< it has been run to its end, but its loop is still there
     std::atomic<bool> in_use_ = false;

@@ -18,6 +18,7 @@
 #include "record.hpp"
 #include "request.hpp"
 #include "ricochet/detail/core.hpp"
+#include "ricochet/detail/phased_run.hpp"
 
 namespace ricochet::python {
 
@@ -73,6 +74,15 @@ public:
     virtual void step_by_series(detail::RunSetup<State>& /*setup*/)
     {
         throw std::logic_error("a door that is not opened for steps by series");
+    }
+
+    /// Whether the system has set-valued motion.
+    [[nodiscard]] virtual bool has_inclusion() const noexcept { return false; }
+    /// Adds the inclusions of such a system to the setup of a run from a state of n components.
+    virtual void add_inclusions(detail::PhasedSetup<State>& /*setup*/, std::size_t /*n*/,
+                                const Options& /*options*/)
+    {
+        throw std::logic_error("a door to a system without set-valued motion");
     }
 
     [[nodiscard]] virtual SignalWatch& watch() noexcept { return watch_; }

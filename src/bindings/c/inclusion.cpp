@@ -1,0 +1,106 @@
+#include "bindings/c/inclusion.hpp"
+
+#include <string>
+#include <utility>
+
+#include "bindings/c/callback_system.hpp"
+#include "bindings/c/structs.hpp"
+
+namespace ricochet::c {
+
+namespace {
+
+[[noreturn]] void refuse_inclusion(const std::string& message)
+{
+    throw Refusal(RC_INVALID, "rc_inclusion: " + message);
+}
+
+void require_here(bool fulfilled, const char* message)
+{
+    if (!fulfilled) refuse_inclusion(message);
+}
+
+/// The callbacks of a system in one mode.
+class InclusionInMode final : public detail::SizedInclusion {
+public:
+    InclusionInMode(std::shared_ptr<const CallbackSystem> system, Mode mode)
+        : system_(std::move(system)), of_(*system_->inclusion()), mode_(mode)
+    {
+    }
+
+    [[nodiscard]] std::size_t size() const noexcept override { return system_->dimension(); }
+    [[nodiscard]] std::size_t reactions() const noexcept override
+    {
+        return of_.callbacks().reactions;
+    }
+    void smooth(double t, const double* w, double* f) const override
+    {
+        heed(of_.callbacks().smooth(user(), mode_, t, w, f, size()), "smooth", t);
+    }
+    void bounds(double t, const double* w, double* lower, double* upper) const override
+    {
+        heed(of_.callbacks().bounds(user(), mode_, t, w, size(), lower, upper, reactions()),
+             "bounds", t);
+    }
+    void offset(double t, double* s, double* rate) const override
+    {
+        if (!of_.callbacks().offset) return;
+        heed(of_.callbacks().offset(user(), mode_, t, s, rate, reactions()), "offset", t);
+    }
+    [[nodiscard]] const double* mass() const noexcept override { return of_.mass(); }
+    [[nodiscard]] const double* observe() const noexcept override { return of_.observe(); }
+    [[nodiscard]] const double* act() const noexcept override { return of_.act(); }
+
+private:
+    [[nodiscard]] void* user() const noexcept { return system_->callbacks().user; }
+
+    std::shared_ptr<const CallbackSystem> system_;
+    const InclusionCallbacks& of_;
+    Mode mode_;
+};
+
+}  // namespace
+
+InclusionCallbacks::InclusionCallbacks(const rc_inclusion* given, const rc_callbacks& system)
+    : at_(read_struct<rc_inclusion>(given, "rc_inclusion"))
+{
+    const std::size_t n = system.dimension, m = at_.reactions;
+    if (m == 0 || m > detail::most_reactions) {
+        refuse_inclusion("reactions must be 1 to 4, got " + std::to_string(m));
+    }
+    if (n > detail::most_components) {
+        refuse_inclusion("the state must have at most 8 components, got " + std::to_string(n));
+    }
+    require_here(at_.smooth, "found no smooth; expected a callback");
+    require_here(at_.bounds, "found no bounds; expected a callback");
+    require_here(at_.observe || m <= n,
+                 "found no observe, and more reactions than components; expected the matrix E");
+    require_here(!at_.in_modes || system.mode_count > 0,
+                 "found in_modes with a mode_count of 0; expected null");
+    require_here(!at_.start_mode || system.mode_count > 0,
+                 "found a start_mode with a mode_count of 0; expected null");
+    require_here(system.mode_count <= 4096, "found a mode_count above 4096");
+    if (at_.mass) mass_.assign(at_.mass, at_.mass + n * n);
+    if (at_.observe) observe_.assign(at_.observe, at_.observe + m * n);
+    if (at_.act) act_.assign(at_.act, at_.act + n * m);
+    if (at_.in_modes) in_modes_.assign(at_.in_modes, at_.in_modes + system.mode_count);
+    if (at_.stands_for) stands_for_.assign(at_.stands_for, at_.stands_for + system.guard_count);
+    for (std::size_t i = 0; i < stands_for_.size(); ++i) {
+        if (stands_for_[i] < m || stands_for_[i] == RC_NO_REACTION) continue;
+        refuse_inclusion("stands_for of guard " + std::to_string(i) + " must be below " +
+                         std::to_string(m) + ", the number of reactions, or RC_NO_REACTION, got " +
+                         std::to_string(stands_for_[i]));
+    }
+    at_.mass = at_.observe = at_.act = nullptr;
+    at_.stands_for = nullptr;
+    at_.in_modes = nullptr;
+}
+
+detail::Shared<const detail::SizedInclusion> inclusion_in(
+    std::shared_ptr<const CallbackSystem> system, Mode mode)
+{
+    return detail::Shared<const detail::SizedInclusion>::make<InclusionInMode>(std::move(system),
+                                                                               mode);
+}
+
+}  // namespace ricochet::c

@@ -1,0 +1,151 @@
+#include "ricochet/detail/sized_inclusion.hpp"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "ricochet/detail/inclusion_sizes.hpp"
+#include "ricochet/detail/phased_run.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+/// A box of `count` of M reactions. The others are zero.
+template <int M>
+struct SizedBox {
+    static constexpr auto room = static_cast<std::size_t>(M);
+    std::size_t count;
+    std::array<double, room> lower_{}, upper_{};
+
+    [[nodiscard]] std::size_t dimension() const noexcept { return count; }
+    [[nodiscard]] double lower(std::size_t i) const noexcept { return lower_[i]; }
+    [[nodiscard]] double upper(std::size_t i) const noexcept { return upper_[i]; }
+    void project(std::span<const double> z, std::span<double> p) const { clamp(*this, z, p); }
+    void derivative(std::span<const double> z, std::span<double> d) const
+    {
+        clamp_derivative(*this, z, d);
+    }
+    [[nodiscard]] std::string_view fault() const noexcept
+    {
+        for (std::size_t i = 0; i < count; ++i) {
+            const std::string_view fault = interval_fault(lower_[i], upper_[i]);
+            if (!fault.empty()) return fault;
+        }
+        return "";
+    }
+};
+
+/// Pads an inclusion to N components and M reactions as any_inclusion.hpp describes.
+template <int N, int M>
+struct SizedSystem {
+    static constexpr int state_size = N, reaction_size = M;
+    using Vector = Eigen::Matrix<double, N, 1>;
+    using Reaction = Eigen::Matrix<double, M, 1>;
+
+    Shared<const SizedInclusion> of;
+
+    void smooth(double t, const Vector& w, Vector& f) const
+    {
+        f.setZero();
+        of->smooth(t, w.data(), f.data());
+    }
+    [[nodiscard]] SizedBox<M> reaction_set(double t, const Vector& w) const
+    {
+        SizedBox<M> box{of->reactions()};
+        of->bounds(t, w.data(), box.lower_.data(), box.upper_.data());
+        return box;
+    }
+    void mass(Eigen::Matrix<double, N, N>& a) const
+    {
+        a.setIdentity();
+        if (of->mass()) copy(of->mass(), of->size(), of->size(), a);
+    }
+    template <class Matrix>
+    void observe(Matrix& e) const
+    {
+        e.setZero();
+        if (of->observe()) return copy(of->observe(), of->reactions(), of->size(), e);
+        for (std::size_t i = 0; i < of->reactions(); ++i) e(index(i), index(i)) = 1;
+    }
+    template <class Matrix>
+    void act(Matrix& g) const
+    {
+        g.setZero();
+        if (of->act()) return copy(of->act(), of->size(), of->reactions(), g);
+        Eigen::Matrix<double, M, N> e;
+        observe(e);
+        g = e.transpose();
+    }
+    void offset(double t, Reaction& s) const
+    {
+        Reaction rate;
+        read(t, s, rate);
+    }
+    void offset_rate(double t, Reaction& rate) const
+    {
+        Reaction s;
+        read(t, s, rate);
+    }
+
+private:
+    [[nodiscard]] static Eigen::Index index(std::size_t i) { return static_cast<Eigen::Index>(i); }
+    template <class Matrix>
+    static void copy(const double* from, std::size_t rows, std::size_t columns, Matrix& to)
+    {
+        for (std::size_t i = 0; i < rows; ++i) {
+            for (std::size_t j = 0; j < columns; ++j) {
+                to(index(i), index(j)) = from[i * columns + j];
+            }
+        }
+    }
+    void read(double t, Reaction& s, Reaction& rate) const
+    {
+        const Eigen::Index own = index(of->reactions());
+        for (Eigen::Index i = 0; i < M; ++i) {
+            s[i] = i < own ? 0 : -1;
+            rate[i] = 0;
+        }
+        of->offset(t, s.data(), rate.data());
+    }
+};
+
+template <int N, int M>
+[[nodiscard]] Owner<BranchPhases> make_of(const Shared<const SizedInclusion>& inclusion,
+                                          const BranchPhasesOptions& options)
+{
+    const SizedSystem<N, M> system{inclusion};
+    const auto n = static_cast<Eigen::Index>(inclusion->size());
+    const auto m = static_cast<Eigen::Index>(inclusion->reactions());
+    const AnyInclusion<N, M> any(inclusion_table<SizedSystem<N, M>, N, M>,
+                                 std::make_shared<const SizedSystem<N, M>>(system), n, m);
+    return make_branch_phases<N, M>(any, options);
+}
+
+}  // namespace
+
+Owner<BranchPhases> make_branch_phases(Shared<const SizedInclusion> inclusion,
+                                       const BranchPhasesOptions& options)
+{
+    const std::size_t n = inclusion->size(), m = inclusion->reactions();
+    const auto fits = [&](std::size_t components, std::size_t reactions) {
+        return n <= components && m <= reactions;
+    };
+    if (n == 0 || m == 0 || !fits(most_components, most_reactions)) {
+        refuse_inclusion(
+            fmt::format("a state of 1 to {} components and 1 to {} reactions are "
+                        "followed, not {} and {}",
+                        most_components, most_reactions, n, m));
+    }
+    if (fits(1, 1)) return make_of<1, 1>(inclusion, options);
+    if (fits(2, 1)) return make_of<2, 1>(inclusion, options);
+    if (fits(3, 1)) return make_of<3, 1>(inclusion, options);
+    if (fits(4, 2)) return make_of<4, 2>(inclusion, options);
+    return make_of<8, 4>(inclusion, options);
+}
+
+}  // namespace ricochet::detail

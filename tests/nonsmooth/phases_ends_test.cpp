@@ -1,0 +1,104 @@
+// Runs with phases that end because the inclusion does not say how the motion goes on, or says
+// something else than the flow. Tolerances as in phased_runs.hpp.
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+
+#include "automata.hpp"
+#include "phased_runs.hpp"
+
+namespace ricochet::phases_ends_test {
+namespace {
+
+using One = std::array<double, 1>;
+using Two = std::array<double, 2>;
+
+/// w' = F + Sgn w: the reaction pushes w away from zero.
+struct Repulsive {
+    using State = One;
+    double load;
+
+    struct Motion {
+        static constexpr int state_size = 1, reaction_size = 1;
+        using Vector = Eigen::Matrix<double, 1, 1>;
+        double load;
+
+        void smooth(double, const Vector&, Vector& f) const { f[0] = load; }
+        static void act(Eigen::Matrix<double, 1, 1>& g) { g << -1; }
+        [[nodiscard]] static sets::Box<1> reaction_set(double, const Vector&)
+        {
+            return sets::Box<1>({-1}, {1});
+        }
+    };
+    void flow(double, const State& x, State& dxdt) const { dxdt[0] = load + (x[0] >= 0 ? 1 : -1); }
+    [[nodiscard]] Motion set_valued() const { return {load}; }
+};
+
+TEST(PhasesEnds, ARepulsiveReactionIsCrossedWhereOneMotionIsLeft)
+{
+    const auto run = run_of(Repulsive{3}, One{-1}, until(1));
+    expect_end(run, One{2});
+    expect_times(times_of(run.events, EventKind::mode), {0.5});
+    expect_end(run_of(Repulsive{3}, One{0}, until(1)), One{4});
+}
+
+TEST(PhasesEnds, SeveralMotionsFromOneStateEndTheRunNamingTheReaction)
+{
+    for (const double load : {0.0, 0.5, -0.5}) {
+        const auto run = run_of(Repulsive{load}, One{0}, until(1));
+        EXPECT_EQ(run.outcome, Outcome::several) << load;
+        EXPECT_EQ(run.t, 0);
+        EXPECT_EQ(run.reason,
+                  "where its y is zero, reaction 0 may hold it or let it leave to either side");
+    }
+}
+
+TEST(PhasesEnds, SeveralMotionsEndARunOfTheInclusionAloneToo)
+{
+    const Repulsive::Motion motion{0};
+    const auto run = hand_over(motion, Repulsive::Motion::Vector::Zero(), {.t_end = 1});
+    EXPECT_EQ(run.outcome, Outcome::several);
+    EXPECT_EQ(run.state.t, 0);
+    const auto passed =
+        hand_over(Repulsive::Motion{3}, Repulsive::Motion::Vector::Zero(), {.t_end = 1});
+    EXPECT_EQ(passed.outcome, Outcome::reached_end);
+    EXPECT_NEAR(passed.state.w[0], 4, exact_motion);
+}
+
+/// A block whose flow knows a part of the friction alone.
+struct Forgetful : Slider<1> {
+    double known = 0.5;
+
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        f(t, x, dxdt);
+        dxdt[0] -= known * (x[0] >= 0 ? friction : -friction);
+    }
+};
+
+TEST(PhasesEnds, AFlowThatIsNotThatOfTheInclusionEndsTheRunWhereItTakesOver)
+{
+    const Forgetful system{{.f = [](double, const One&, One& dxdt) { dxdt[0] = 0; }}};
+    const auto run = run_of(system, One{1}, until(3));
+    EXPECT_EQ(run.outcome, Outcome::law_violated);
+    EXPECT_NEAR(run.t, 2, exact_motion);
+    EXPECT_NE(run.reason.find("the flow gives component 0 the rate -0.5, and the inclusion -1"),
+              std::string::npos)
+        << run.reason;
+}
+
+TEST(PhasesEnds, ABalanceOfLoadAndFrictionIsNoContradiction)
+{
+    // It slides with a rate of 1e-9, the difference of two terms of size 1.
+    for (const double excess : {1e-9, 1e-13}) {
+        const Slider<1> system{
+            .f = [excess](double, const One&, One& dxdt) { dxdt[0] = 1 - excess; }};
+        const auto run = run_of(system, One{excess / 2}, until(2));
+        expect_end(run, One{0});
+    }
+}
+
+}  // namespace
+}  // namespace ricochet::phases_ends_test

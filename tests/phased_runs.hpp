@@ -1,0 +1,92 @@
+// Runs of systems with set_valued() through all doors, and what is expected of them.
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "ricochet/ricochet.hpp"
+#include "sliding_systems.hpp"
+
+namespace ricochet {
+
+/// Bound of the errors of location where the motion is a polynomial that the method integrates
+/// exactly: what is left is rounding.
+constexpr double exact_motion = 1e-9;
+
+[[nodiscard]] inline Options until(double t_end)
+{
+    return {.t_end = t_end, .rtol = 1e-10, .atol = 1e-12};
+}
+
+/// Runs to the end by steps; after every tenth a new simulation goes on from what was saved.
+template <class System, class X>
+[[nodiscard]] X end_by_snapshots(const System& system, const X& x0, const Options& options)
+{
+    auto simulation = std::make_unique<Simulation<System, X>>(system, x0, options);
+    for (int steps = 1; simulation->step(); ++steps) {
+        if (steps % 10 != 0) continue;
+        const Snapshot saved = simulation->save();
+        simulation = std::make_unique<Simulation<System, X>>(system, x0, options);
+        simulation->restore(saved);
+    }
+    return simulation->x();
+}
+
+/// Integrates through all doors, which have to agree, and returns the run of `integrate`.
+template <class System, class X>
+[[nodiscard]] auto run_of(const System& system, const X& x0, const Options& options)
+{
+    Simulation whole(system, x0, options);
+    while (whole.step()) {
+    }
+    EXPECT_EQ(end_by_snapshots(system, x0, options), whole.x());
+    auto run = integrate(system, x0, options);
+    for (std::size_t i = 0; i < x0.size(); ++i) {
+        EXPECT_NEAR(run.x[i], whole.x()[i], exact_motion) << i;
+    }
+    EXPECT_EQ(run.outcome, whole.run().outcome);
+    return run;
+}
+
+template <class Run, class X>
+void expect_end(const Run& run, const X& x, double error = exact_motion)
+{
+    ASSERT_EQ(run.outcome, Outcome::reached_end) << run.t << ' ' << run.reason;
+    for (std::size_t i = 0; i < x.size(); ++i) EXPECT_NEAR(run.x[i], x[i], error) << i;
+}
+
+template <class Events>
+[[nodiscard]] std::vector<double> times_at(const Events& events, std::size_t guard, EventKind kind)
+{
+    std::vector<double> times;
+    for (const auto& event : events) {
+        if (event.guard == guard && event.kind == kind) times.push_back(event.t);
+    }
+    return times;
+}
+
+inline void expect_times(const std::vector<double>& found, const std::vector<double>& expected,
+                         double error = exact_motion)
+{
+    ASSERT_EQ(found.size(), expected.size());
+    for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k], expected[k], error) << k;
+}
+
+/// The next of these times, as time events.
+[[nodiscard]] inline auto at_times(std::vector<double> times)
+{
+    return [times = std::move(times)](double t) {
+        for (const double time : times) {
+            if (time > t) return time;
+        }
+        return std::numeric_limits<double>::infinity();
+    };
+}
+
+}  // namespace ricochet
