@@ -695,7 +695,7 @@ protected:
     /// The same after the holds have been put back, with guards that already know it.
     void resume_holds()
     {
-        const bool changed = changed_holds_;
+        const std::uint8_t changed = changed_holds_;
         rested_.clear();
         renew_holds();
         changed_holds_ = changed;
@@ -774,8 +774,6 @@ protected:
     void arm_after_rest();
 
     void enable_guards();
-    /// Guards that are armed again are not newly enabled.
-    void forget_enabling();
 
     /// Whether the event of a guard armed on `side` cannot come before it has returned: it is
     /// beyond its surface.
@@ -1010,7 +1008,9 @@ protected:
     bool resting_ = false;  ///< something is held, and nothing moves
     Holds holds_;
     boost::container::small_vector<Rested, 2> rested_;  ///< at this instant
-    bool changed_holds_ = false;                        ///< since guards were enabled
+    /// Number of times that guards still have to be enabled since the holds have changed: once,
+    /// and once more, so that none is newly enabled after that.
+    std::uint8_t changed_holds_ = 0;
     bool stops_ = false;
     std::size_t stopper_ = no_guard;  ///< the guard of the set that ends the run
     bool asked_ = false;              ///< the network has been asked about the current step

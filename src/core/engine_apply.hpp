@@ -23,7 +23,10 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
     located_ = located;
     on_time_ = on_time;
     mode_before_ = step_.mode();
-    if (on_time) record_time_event(t);
+    if (on_time) {
+        record_time_event(t);
+        if (located && !left_known_) leave_from_end();
+    }
     for (const std::size_t i : search_.fired()) record_crossing(i, t, located);
     if (phases_) record_changes(t, located);
     if (!goes_on()) {

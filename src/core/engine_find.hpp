@@ -109,7 +109,8 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
     bank_.begin_search(step_.h());
     for (bool may_tie = true;;) {
         const bool found = search_.find_set(step_, bank_, time_event_due_, calls());
-        if (cuts_before_windows_ && found && may_tie && ends_inside_window()) return false;
+        if (!single && cuts_before_windows_ && found && may_tie && ends_inside_window())
+            return false;
         const bool tied = may_tie && add_ties(found);
         if (!found && !tied) break;
         may_tie = may_tie && !tied;
@@ -129,8 +130,6 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
             step_.flow(search_.at(), search_.before(), left_rate_);
             assign(left_start_, step_.rate0());
             left_after_ = search_.at();
-        } else if (on_time_) {
-            leave_from_end();
         }
         place_set(step_.instant(search_.at(), search_.at_remainder()));
         before_resets();

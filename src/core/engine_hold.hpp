@@ -180,7 +180,7 @@ void EventEngine<X, single>::renew_holds()
     step_.hold_components({components.data(), components.size()});
     on_series_ = may_be_on_series_ && step_.has_guard_series();
     bank_.leave_series();
-    changed_holds_ = true;
+    changed_holds_ = 2;
 }
 
 template <class X, bool single>

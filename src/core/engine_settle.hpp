@@ -212,7 +212,7 @@ inline void EventEngine<X, single>::enable_guards()
         record.enabled = enabled;
     }
     bank_.heed_enabled();
-    changed_holds_ = false;
+    if (changed_holds_ > 0) --changed_holds_;
 }
 
 template <class X, bool single>
@@ -225,8 +225,7 @@ inline void EventEngine<X, single>::arm_all()
         widest = std::max(widest, bank_[i].band);
     }
     search_.fired().clear();
-    const bool released = changed_holds_;
-    if (system_->moded || released) enable_guards();
+    if (system_->moded || changed_holds_ > 0) enable_guards();
     bank_.await_none();
     newly_armed_ = true;
     watching_ = false;
@@ -243,15 +242,6 @@ inline void EventEngine<X, single>::arm_all()
             goes_on = arm_one(i, widest, opens);
         }
     });
-    if (released) forget_enabling();
-}
-
-template <class X, bool single>
-void EventEngine<X, single>::forget_enabling()
-{
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        if (std::as_const(bank_)[i].newly_enabled) bank_[i].newly_enabled = false;
-    }
 }
 
 template <class X, bool single>

@@ -60,8 +60,7 @@ public:
             h_next_ = std::min(h_next_, options_.h_max);
         }
         first_step_ = h_next_;
-        this->cuts_before_windows_ =
-            options_.event_window > 0 && !defers_ && (bank_.size() > 1 || timed_);
+        this->cuts_before_windows_ = !single && options_.event_window > 0 && !defers_;
         flight_start_ = options_.t_start;
         this->refuse_bad_modes();
         if (!step_.flow_fits()) throw_flow_does_not_fit("integrate", components_);
