@@ -429,6 +429,7 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
     if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
     if (!std::isfinite(rate)) {
         all_finite(step_.rate0()) ? end_not_finite("rate", i) : end_not_finite("flow", no_guard);
+        run_.guard = i;
         return Side::plateau;
     }
     if (rate != 0 && bank_[i].fired) return side_of(rate);
