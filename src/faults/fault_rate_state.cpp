@@ -86,7 +86,7 @@ public:
             if (!solved || error > 1) {
                 ++out_.rupture.statistics.rejected;
                 h = step * (solved ? std::clamp(growth(error), 0.1, 0.9) : 0.25);
-                if (h < 1e-14 * t_ + 1e-12) {
+                if (h < least_step()) {
                     return finish(solved ? Outcome::step_underflow : Outcome::not_converged);
                 }
                 continue;
@@ -221,9 +221,14 @@ private:
         }
     }
 
-    /// Norm of the whole field, the reference of its error.
+    /// [time units] Length below which steps are not taken.
+    [[nodiscard]] double least_step() const noexcept { return 1e-14 * t_ + 1e-12; }
+
+    /// Norm of the whole field, the reference of its error. What the time does not resolve is no
+    /// error: a braking changes the velocity by that much in the shortest step.
     [[nodiscard]] double size_of_velocity() const
     {
+        const double brief = std::max(braking, least_step() / options_.rtol);
         const double least = 1e-6 * law_.parameters().v_star / fault_.velocity_unit();
         return std::max(next_.v.norm(), now_.v.norm()) +
                brief * std::max(next_.acceleration.norm(), now_.acceleration.norm()) +
@@ -262,7 +267,7 @@ private:
 
     /// In time units. Its neighbours brake an element evenly to rest, down to where log V counts:
     /// from 0.1 to 1e-15 m/s in a time below the resolution of its velocity.
-    static constexpr double brief = 0.01;
+    static constexpr double braking = 0.01;
 
     [[nodiscard]] double growth(double error) const
     {

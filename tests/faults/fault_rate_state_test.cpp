@@ -384,6 +384,25 @@ TEST(FaultRateState, OrderFourBringsABrakedElementToRest)
     }
 }
 
+TEST(FaultRateState, ABrakingBelowTheResolutionOfTheTimeIsNoError)
+{
+    // Late in the run two elements are braked to rest within 1e-8 time units, less than the
+    // shortest step, and no step could follow that to 1e-4.
+    const StrikeSlipFault fault({.elements = 4});
+    FaultFriction friction;
+    friction.law = {.a = 0.006, .b = 0.024, .f_star = 0.6, .v_star = 1e-6, .d_rs = 0.006};
+    friction.overload = 1e-3;
+    double mean_slip = 0;
+    for (const double rtol : {1e-6, 1e-5, 1e-4}) {
+        const RuptureOptions options{.t_end = 9.4e8, .rtol = rtol, .max_steps = 200'000};
+        const RateStateRupture r = simulate(fault, options, friction, {.order = 4});
+        ASSERT_EQ(r.rupture.outcome, Outcome::reached_end) << rtol;
+        EXPECT_EQ(r.earthquakes.size(), 2U) << rtol;
+        if (mean_slip == 0) mean_slip = r.rupture.mean_slip;
+        EXPECT_NEAR(r.rupture.mean_slip, mean_slip, 1e-4 * mean_slip) << rtol;
+    }
+}
+
 TEST(FaultRateState, OrderFourGoesOnAfterAnEarthquake)
 {
     // Every element is braked to rest in it. With order 4 alone they creep forever, at a velocity
