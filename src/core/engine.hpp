@@ -787,7 +787,7 @@ protected:
 
     /// Puts guard i into the next set, or records its event if that is all.
     /// @param from  the side that it has left
-    void have_event(std::size_t i, Arming arming, Side from);
+    void have_event(std::size_t i, life::Arming arming, Side from);
 
     /// Fires guard i because its condition holds, not because of a crossing.
     void fire_by_condition(std::size_t i);
@@ -836,9 +836,9 @@ protected:
     [[nodiscard]] unsigned facts_of(const GuardRecord& record, Side from,
                                     const Seen& seen) const noexcept
     {
-        return declared_of(record.info, resets_any_ && record.info.resets, record.acting) |
-               seen_of(from, seen.side, seen.on, record.info.crossing) |
-               (seen.set_off ? is_set_off : 0u);
+        return life::declared_of(record.info, resets_any_ && record.info.resets, record.acting) |
+               life::seen_of(from, seen.side, seen.on, record.info.crossing) |
+               (seen.set_off ? life::is_set_off : 0u);
     }
     /// Whether a time event has ended the veto of guard i, which lies on its surface: a guard that
     /// was passed is armed beyond.

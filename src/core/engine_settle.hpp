@@ -149,28 +149,28 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
     if (on) record.band = std::fabs(g);
     record.departs = on;
     const Side side = on ? heading(i) : side_of(g);
-    const bool asks_here = begins && info.at_start && !counts(side, info.crossing);
-    const Arming arming = arming_of(
-        Cause::start, facts_of(record, Side::plateau, {side, on}) | (asks_here ? asks : 0u));
-    if (arming == Arming::outside && is_enabled_here(i)) {
+    const bool asks = begins && info.at_start && !counts(side, info.crossing);
+    const life::Arming arming = life::arming_of(
+        life::Cause::start, facts_of(record, Side::plateau, {side, on}) | (asks ? life::asks : 0u));
+    if (arming == life::Arming::outside && is_enabled_here(i)) {
         throw_start_outside_mode(who_, i, info.name, options_.t_start, g);
     }
     bank_.arm(i, side);
     if (side == Side::plateau)
-        bank_.await(i, awaited_side(Cause::start, info, record.acting, side));
-    if (arming == Arming::waits) {
+        bank_.await(i, life::awaited_side(life::Cause::start, info, record.acting, side));
+    if (arming == life::Arming::waits) {
         // One that fires at the start has done so in the run before.
         const bool is_known = !begins && info.at_start && options_.continues;
         if (record.acting && is_beyond(side, info.crossing) && !is_known) count_armed_beyond(i);
-    } else if (arming != Arming::outside && counts_here(i)) {
+    } else if (arming != life::Arming::outside && counts_here(i)) {
         have_event(i, arming, side);
     }
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::have_event(std::size_t i, Arming arming, Side from)
+inline void EventEngine<X, single>::have_event(std::size_t i, life::Arming arming, Side from)
 {
-    if (arming == Arming::by_condition) {
+    if (arming == life::Arming::by_condition) {
         fire_by_condition(i);
     } else if (std::as_const(bank_)[i].acting) {
         search_.fired().push_back(i);
@@ -257,15 +257,15 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
     const Side before = record.side != Side::plateau ? record.side : record.awaited;
     const Seen seen = see(i, before, widest, opens);
     const Side side = seen.side;
-    const Cause cause = record.fired           ? Cause::fired
-                        : record.newly_enabled ? Cause::enabled
-                        : opens                ? Cause::opened
-                                               : Cause::stood;
+    const life::Cause cause = record.fired           ? life::Cause::fired
+                              : record.newly_enabled ? life::Cause::enabled
+                              : opens                ? life::Cause::opened
+                                                     : life::Cause::stood;
     record.departs = seen.on || record.fired || record.newly_enabled;
     bank_.arm(i, side);
     record.from = 0;
     if (side == Side::plateau) {
-        bank_.await(i, awaited_side(cause, record.info, record.acting, before));
+        bank_.await(i, life::awaited_side(cause, record.info, record.acting, before));
     }
     if (changed_mode_ && located_ && crossing == Crossing::either && record.fired &&
         record.acting && side == before && side != Side::plateau) {
@@ -274,15 +274,16 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
     }
     // At its own event inside a step the guard was armed on the side that it has left.
     const Side from = record.fired && located_ ? opposite(before) : before;
-    const bool asks_here = record.newly_enabled && fires_at_entry(i);
-    const Arming arming = arming_of(cause, facts_of(record, from, seen) | (asks_here ? asks : 0u));
-    const bool has_event = arming == Arming::fires || arming == Arming::by_condition;
+    const bool asks = record.newly_enabled && fires_at_entry(i);
+    const life::Arming arming =
+        life::arming_of(cause, facts_of(record, from, seen) | (asks ? life::asks : 0u));
+    const bool has_event = arming == life::Arming::fires || arming == life::Arming::by_condition;
     if (has_event && counts_here(i)) {
         have_event(i, arming, before);
     } else if (record.newly_enabled && record.acting && is_beyond(side, crossing)) {
         count_armed_beyond(i);
     }
-    const bool outside = arming == Arming::outside && is_enabled_here(i);
+    const bool outside = arming == life::Arming::outside && is_enabled_here(i);
     if (outside) end(Outcome::outside_mode, i);
     return !outside;
 }
@@ -428,8 +429,7 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
     }
     if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
     if (!std::isfinite(rate)) {
-        all_finite(step_.rate0()) ? end_not_finite("rate", i) : end_not_finite("flow", no_guard);
-        run_.guard = i;
+        end_not_finite(all_finite(step_.rate0()) ? "rate" : "flow", i);
         return Side::plateau;
     }
     if (rate != 0 && bank_[i].fired) return side_of(rate);

@@ -2,7 +2,7 @@
 //
 // A guard is armed at the start of a run and after every set of events, on the side of its surface
 // on which it lies or to which it heads. What brought it there, what it declares and what is seen
-// of it decide whether that is an event, by the first row of `guard_life` that fits; every row is a
+// of it decide whether that is an event, by the first row of `rows` that fits; every row is a
 // promise. The engine only finds out what is seen: the rounding of values, rates and times.
 #pragma once
 
@@ -13,7 +13,7 @@
 
 #include "ricochet/hybrid/guard.hpp"
 
-namespace ricochet::detail {
+namespace ricochet::detail::life {
 
 /// Why a guard is armed.
 enum class Cause : std::uint8_t {
@@ -49,7 +49,7 @@ enum class Arming : std::uint8_t {
 
 /// A row of the table: it fits if the cause is one of `causes`, all facts of `needs` hold, and none
 /// of `forbids`.
-struct LifeRow {
+struct Row {
     unsigned causes;
     unsigned needs, forbids;
     Arming arming;
@@ -60,61 +60,56 @@ struct LifeRow {
 {
     return 1u << static_cast<unsigned>(cause);
 }
-inline constexpr unsigned at_its_start = by(Cause::start) | by(Cause::enabled);
 inline constexpr unsigned anew = by(Cause::fired) | by(Cause::enabled);
 inline constexpr unsigned whenever = (1u << causes) - 1;
 
-inline constexpr std::array guard_life{
-    LifeRow{whenever, is_set_off, 0, Arming::fires,
-            "a flow that a set has changed, and that now presses across the surface, fires it"},
-    LifeRow{whenever, asks, 0, Arming::by_condition,
-            "beyond its surface it fires where at_start or at_entry asks for it"},
+inline constexpr std::array rows{
+    Row{whenever, is_set_off, 0, Arming::fires,
+        "a flow that a set has changed, and that now presses across the surface, fires it"},
+    Row{whenever, asks, 0, Arming::by_condition,
+        "beyond its surface it fires where at_start or at_entry asks for it"},
     // guards that bound the motion
-    LifeRow{by(Cause::start) | anew, is_unilateral | is_below, on_surface, Arming::outside,
-            "no start, no reset and no mode leaves the motion behind a surface that bounds it"},
-    LifeRow{by(Cause::start) | anew | by(Cause::opened), is_unilateral | is_below | on_surface, 0,
-            Arming::fires, "a motion that presses on a surface that bounds it fires again"},
+    Row{by(Cause::start) | anew, is_unilateral | is_below, on_surface, Arming::outside,
+        "no start, no reset and no mode leaves the motion behind a surface that bounds it"},
+    Row{by(Cause::start) | anew | by(Cause::opened), is_unilateral | is_below | on_surface, 0,
+        Arming::fires, "a motion that presses on a surface that bounds it fires again"},
     // the others fire where they are crossed
-    LifeRow{by(Cause::stood), crosses, 0, Arming::fires,
-            "a reset that carries it across in its direction fires it at the same instant"},
-    LifeRow{by(Cause::fired), crosses, has_reset | on_surface, Arming::fires,
-            "carried back across by the reset of another, it fires again"},
-    LifeRow{by(Cause::enabled) | by(Cause::opened), arrives | acts | on_surface, 0, Arming::fires,
-            "where its mode begins, or a veto ends, on its surface while it crosses, it fires"},
-    LifeRow{whenever, 0, 0, Arming::waits,
-            "else it waits for its next crossing, beyond its surface for its return"},
+    Row{by(Cause::stood), crosses, 0, Arming::fires,
+        "a reset that carries it across in its direction fires it at the same instant"},
+    Row{by(Cause::fired), crosses, has_reset | on_surface, Arming::fires,
+        "carried back across by the reset of another, it fires again"},
+    Row{by(Cause::enabled) | by(Cause::opened), arrives | acts | on_surface, 0, Arming::fires,
+        "where its mode begins, or a veto ends, on its surface while it crosses, it fires"},
+    Row{whenever, 0, 0, Arming::waits,
+        "else it waits for its next crossing, beyond its surface for its return"},
 };
 
 /// Number of the first row that fits.
-[[nodiscard]] constexpr std::size_t life_row(Cause cause, unsigned known) noexcept
+[[nodiscard]] constexpr std::size_t row_of(Cause cause, unsigned known) noexcept
 {
     std::size_t row = 0;
-    for (; row + 1 < guard_life.size(); ++row) {
-        const LifeRow& fits = guard_life[row];
+    for (; row + 1 < rows.size(); ++row) {
+        const Row& fits = rows[row];
         const bool all = (known & fits.needs) == fits.needs && (known & fits.forbids) == 0;
         if (all && (fits.causes & by(cause)) != 0) break;
     }
     return row;
 }
 
-namespace life {
-
 /// All of them, so that none is searched for in a run.
 inline constexpr auto armings = [] {
     std::array<std::array<Arming, facts>, causes> all{};
     for (std::size_t cause = 0; cause < causes; ++cause) {
         for (unsigned known = 0; known < facts; ++known) {
-            all[cause][known] = guard_life[life_row(static_cast<Cause>(cause), known)].arming;
+            all[cause][known] = rows[row_of(static_cast<Cause>(cause), known)].arming;
         }
     }
     return all;
 }();
 
-}  // namespace life
-
 [[nodiscard]] constexpr Arming arming_of(Cause cause, unsigned known) noexcept
 {
-    return life::armings[static_cast<std::size_t>(cause)][known];
+    return armings[static_cast<std::size_t>(cause)][known];
 }
 
 /// What a guard declares.
@@ -143,4 +138,4 @@ inline constexpr auto armings = [] {
     return info.crossing == Crossing::falling ? Side::above : Side::below;
 }
 
-}  // namespace ricochet::detail
+}  // namespace ricochet::detail::life

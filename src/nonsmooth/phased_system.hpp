@@ -417,9 +417,8 @@ void PhasedSystem<C>::find_asked_reactions()
 template <class C>
 void PhasedSystem<C>::refuse_partly_active() const
 {
-    constexpr std::size_t most = 4096;
     if (by_mode_ || !own_.enabled_in || !own_.moded) return;
-    const std::size_t modes = std::min(own_.mode_count(user_.door), most);
+    const std::size_t modes = std::min(own_.mode_count(user_.door), most_inclusions);
     for (std::size_t mode = 0; mode < modes; ++mode) {
         std::size_t inactive = no_reaction, active = 0;
         for (std::size_t k = 0; k < reactions_; ++k) {

@@ -1,4 +1,4 @@
-#include "ricochet/detail/sized_inclusion.hpp"
+#include "sized_inclusion.hpp"
 
 #include <fmt/format.h>
 
@@ -63,54 +63,50 @@ struct SizedSystem {
     void mass(Eigen::Matrix<double, N, N>& a) const
     {
         a.setIdentity();
-        if (of->mass()) copy(of->mass(), of->size(), of->size(), a);
+        copy(of->matrices().mass, of->size(), of->size(), a);
     }
     template <class Matrix>
     void observe(Matrix& e) const
     {
         e.setZero();
-        if (of->observe()) return copy(of->observe(), of->reactions(), of->size(), e);
+        if (copy(of->matrices().observe, of->reactions(), of->size(), e)) return;
         for (std::size_t i = 0; i < of->reactions(); ++i) e(index(i), index(i)) = 1;
     }
     template <class Matrix>
     void act(Matrix& g) const
     {
         g.setZero();
-        if (of->act()) return copy(of->act(), of->size(), of->reactions(), g);
+        if (copy(of->matrices().act, of->size(), of->reactions(), g)) return;
         Eigen::Matrix<double, M, N> e;
         observe(e);
         g = e.transpose();
     }
     void offset(double t, Reaction& s) const
     {
-        Reaction rate;
-        read(t, s, rate);
+        const Eigen::Index own = index(of->reactions());
+        for (Eigen::Index i = 0; i < M; ++i) s[i] = i < own ? 0 : -1;
+        of->offset(t, s.data());
     }
     void offset_rate(double t, Reaction& rate) const
     {
-        Reaction s;
-        read(t, s, rate);
+        rate.setZero();
+        of->offset_rate(t, rate.data());
     }
 
 private:
     [[nodiscard]] static Eigen::Index index(std::size_t i) { return static_cast<Eigen::Index>(i); }
+    /// Whether there is a matrix to copy.
     template <class Matrix>
-    static void copy(const double* from, std::size_t rows, std::size_t columns, Matrix& to)
+    static bool copy(const std::vector<double>& from, std::size_t rows, std::size_t columns,
+                     Matrix& to)
     {
+        if (from.empty()) return false;
         for (std::size_t i = 0; i < rows; ++i) {
             for (std::size_t j = 0; j < columns; ++j) {
                 to(index(i), index(j)) = from[i * columns + j];
             }
         }
-    }
-    void read(double t, Reaction& s, Reaction& rate) const
-    {
-        const Eigen::Index own = index(of->reactions());
-        for (Eigen::Index i = 0; i < M; ++i) {
-            s[i] = i < own ? 0 : -1;
-            rate[i] = 0;
-        }
-        of->offset(t, s.data(), rate.data());
+        return true;
     }
 };
 

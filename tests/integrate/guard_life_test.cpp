@@ -16,25 +16,25 @@
 namespace ricochet {
 namespace {
 
-using detail::Arming;
-using detail::Cause;
+namespace life = detail::life;
+using life::Cause;
 
 TEST(GuardLife, EveryRowDecidesSomething)
 {
-    std::array<unsigned, detail::guard_life.size()> decided{};
-    for (std::size_t cause = 0; cause < detail::causes; ++cause) {
-        for (unsigned known = 0; known < detail::facts; ++known) {
-            ++decided[detail::life_row(static_cast<Cause>(cause), known)];
+    std::array<unsigned, life::rows.size()> decided{};
+    for (std::size_t cause = 0; cause < life::causes; ++cause) {
+        for (unsigned known = 0; known < life::facts; ++known) {
+            ++decided[life::row_of(static_cast<Cause>(cause), known)];
         }
     }
     for (std::size_t row = 0; row < decided.size(); ++row) {
-        EXPECT_GT(decided[row], 0u) << detail::guard_life[row].promise;
+        EXPECT_GT(decided[row], 0u) << life::rows[row].promise;
     }
 }
 
 TEST(GuardLife, NoRowNeedsWhatItForbids)
 {
-    for (const auto& row : detail::guard_life) {
+    for (const auto& row : life::rows) {
         EXPECT_EQ(row.needs & row.forbids, 0u) << row.promise;
         EXPECT_NE(row.causes, 0u) << row.promise;
     }
@@ -42,7 +42,7 @@ TEST(GuardLife, NoRowNeedsWhatItForbids)
 
 TEST(GuardLife, APlateauAwaitsTheDepartureThatCounts)
 {
-    using detail::awaited_side;
+    using life::awaited_side;
     const GuardInfo falling, rising{.crossing = Crossing::rising}, floor{.unilateral = true};
     EXPECT_EQ(awaited_side(Cause::stood, floor, true, Side::below), Side::above);
     EXPECT_EQ(awaited_side(Cause::fired, falling, true, Side::above), Side::plateau);

@@ -15,6 +15,9 @@
 
 namespace ricochet::detail {
 
+/// Number of modes of which each may have an inclusion of its own.
+inline constexpr std::size_t most_inclusions = 4096;
+
 /// What a run with phases consists of, besides its start and its options.
 template <class C>
 struct PhasedSetup {

@@ -592,9 +592,8 @@ private:
     [[nodiscard]] static std::size_t modes_with_inclusions(const System& system)
     {
         if constexpr (!has_inclusion_by_mode<System>) return 1;
-        constexpr std::size_t most = 4096;
         const std::size_t modes = mode_count_of(system);
-        if (modes == 0 || modes > most) {
+        if (modes == 0 || modes > most_inclusions) {
             refuse_inclusion("set_valued(mode) goes with a mode_count of 1 to 4096, not",
                              static_cast<double>(modes));
         }

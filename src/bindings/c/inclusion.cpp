@@ -5,6 +5,7 @@
 
 #include "bindings/c/callback_system.hpp"
 #include "bindings/c/structs.hpp"
+#include "ricochet/detail/phased_run.hpp"
 
 namespace ricochet::c {
 
@@ -42,16 +43,27 @@ public:
         heed(of_.callbacks().bounds(user(), mode_, t, w, size(), lower, upper, reactions()),
              "bounds", t);
     }
-    void offset(double t, double* s, double* rate) const override
+    void offset(double t, double* s) const override
+    {
+        double rate[detail::most_reactions] = {};
+        read_offset(t, s, rate);
+    }
+    void offset_rate(double t, double* rate) const override
+    {
+        double s[detail::most_reactions] = {};
+        read_offset(t, s, rate);
+    }
+    [[nodiscard]] const detail::SizedMatrices& matrices() const noexcept override
+    {
+        return of_.matrices();
+    }
+
+private:
+    void read_offset(double t, double* s, double* rate) const
     {
         if (!of_.callbacks().offset) return;
         heed(of_.callbacks().offset(user(), mode_, t, s, rate, reactions()), "offset", t);
     }
-    [[nodiscard]] const double* mass() const noexcept override { return of_.mass(); }
-    [[nodiscard]] const double* observe() const noexcept override { return of_.observe(); }
-    [[nodiscard]] const double* act() const noexcept override { return of_.act(); }
-
-private:
     [[nodiscard]] void* user() const noexcept { return system_->callbacks().user; }
 
     std::shared_ptr<const CallbackSystem> system_;
@@ -66,10 +78,12 @@ InclusionCallbacks::InclusionCallbacks(const rc_inclusion* given, const rc_callb
 {
     const std::size_t n = system.dimension, m = at_.reactions;
     if (m == 0 || m > detail::most_reactions) {
-        refuse_inclusion("reactions must be 1 to 4, got " + std::to_string(m));
+        refuse_inclusion("reactions must be 1 to " + std::to_string(detail::most_reactions) +
+                         ", got " + std::to_string(m));
     }
     if (n > detail::most_components) {
-        refuse_inclusion("the state must have at most 8 components, got " + std::to_string(n));
+        refuse_inclusion("the state must have at most " + std::to_string(detail::most_components) +
+                         " components, got " + std::to_string(n));
     }
     require_here(at_.smooth, "found no smooth; expected a callback");
     require_here(at_.bounds, "found no bounds; expected a callback");
@@ -79,10 +93,13 @@ InclusionCallbacks::InclusionCallbacks(const rc_inclusion* given, const rc_callb
                  "found in_modes with a mode_count of 0; expected null");
     require_here(!at_.start_mode || system.mode_count > 0,
                  "found a start_mode with a mode_count of 0; expected null");
-    require_here(system.mode_count <= 4096, "found a mode_count above 4096");
-    if (at_.mass) mass_.assign(at_.mass, at_.mass + n * n);
-    if (at_.observe) observe_.assign(at_.observe, at_.observe + m * n);
-    if (at_.act) act_.assign(at_.act, at_.act + n * m);
+    if (system.mode_count > detail::most_inclusions) {
+        refuse_inclusion("mode_count must be at most " + std::to_string(detail::most_inclusions) +
+                         ", got " + std::to_string(system.mode_count));
+    }
+    if (at_.mass) matrices_.mass.assign(at_.mass, at_.mass + n * n);
+    if (at_.observe) matrices_.observe.assign(at_.observe, at_.observe + m * n);
+    if (at_.act) matrices_.act.assign(at_.act, at_.act + n * m);
     if (at_.in_modes) in_modes_.assign(at_.in_modes, at_.in_modes + system.mode_count);
     if (at_.stands_for) stands_for_.assign(at_.stands_for, at_.stands_for + system.guard_count);
     for (std::size_t i = 0; i < stands_for_.size(); ++i) {

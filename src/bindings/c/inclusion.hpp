@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "ricochet/detail/sized_inclusion.hpp"
+#include "nonsmooth/sized_inclusion.hpp"
 #include "ricochet/ricochet.h"
 
 namespace ricochet::c {
@@ -29,19 +29,11 @@ public:
     {
         return stands_for_.empty() ? RC_NO_REACTION : stands_for_[guard];
     }
-    // Null where the default applies.
-    [[nodiscard]] const double* mass() const noexcept { return data(mass_); }
-    [[nodiscard]] const double* observe() const noexcept { return data(observe_); }
-    [[nodiscard]] const double* act() const noexcept { return data(act_); }
+    [[nodiscard]] const detail::SizedMatrices& matrices() const noexcept { return matrices_; }
 
 private:
-    [[nodiscard]] static const double* data(const std::vector<double>& matrix) noexcept
-    {
-        return matrix.empty() ? nullptr : matrix.data();
-    }
-
     rc_inclusion at_;
-    std::vector<double> mass_, observe_, act_;
+    detail::SizedMatrices matrices_;
     std::vector<std::size_t> stands_for_;
     std::vector<std::int32_t> in_modes_;
 };

@@ -11,7 +11,6 @@
 #include "formula_door.hpp"
 #include "numbers.hpp"
 #include "ricochet/detail/guard_view.hpp"
-#include "ricochet/detail/sized_inclusion.hpp"
 
 namespace ricochet::python {
 
@@ -550,22 +549,22 @@ public:
         read(PyTuple_GET_ITEM(result.get(), 0), "lower bounds", reactions(), lower);
         read(PyTuple_GET_ITEM(result.get(), 1), "upper bounds", reactions(), upper);
     }
-    void offset(double t, double* s, double* rate) const override
+    void offset(double t, double* s) const override
     {
         if (of_.offset) read(door_.call(of_.offset, mode_, t).get(), "offset", reactions(), s);
+    }
+    void offset_rate(double t, double* rate) const override
+    {
         if (of_.offset_rate) {
             read(door_.call(of_.offset_rate, mode_, t).get(), "offset_rate", reactions(), rate);
         }
     }
-    [[nodiscard]] const double* mass() const noexcept override { return data(of_.mass); }
-    [[nodiscard]] const double* observe() const noexcept override { return data(of_.observe); }
-    [[nodiscard]] const double* act() const noexcept override { return data(of_.act); }
+    [[nodiscard]] const detail::SizedMatrices& matrices() const noexcept override
+    {
+        return of_.matrices;
+    }
 
 private:
-    [[nodiscard]] static const double* data(const std::vector<double>& matrix) noexcept
-    {
-        return matrix.empty() ? nullptr : matrix.data();
-    }
     [[nodiscard]] PyObject* show(const double* w) const
     {
         door_.there_.assign(w, w + size_);
@@ -601,13 +600,18 @@ void CallbackDoor::add_inclusions(detail::PhasedSetup<State>& setup, std::size_t
                                     std::to_string(of.components) + " components, expected " +
                                     std::to_string(n) + ", those of x0");
     }
-    if (of.observe.empty() && of.reactions > n) {
+    if (of.matrices.observe.empty() && of.reactions > n) {
         throw std::invalid_argument("set_valued: found " + std::to_string(of.reactions) +
                                     " reactions of " + std::to_string(n) +
                                     " components and no observe, expected the matrix");
     }
     const detail::BranchPhasesOptions solving = detail::branch_options(options);
     const std::size_t modes = source_.moded_ ? source_.mode_count_ : 1;
+    if (modes > detail::most_inclusions) {
+        throw std::invalid_argument("set_valued: found " + std::to_string(modes) +
+                                    " modes, expected at most " +
+                                    std::to_string(detail::most_inclusions));
+    }
     for (std::size_t mode = 0; mode < modes; ++mode) {
         detail::Owner<detail::BranchPhases> phases;
         if (of.in_mode.empty() || of.in_mode[mode]) {

@@ -254,9 +254,9 @@ void CallbackSource::read_inclusion(PyObject* specification)
         }
         return out;
     };
-    of.mass = matrix("mass");
-    of.observe = matrix("observe");
-    of.act = matrix("act");
+    of.matrices.mass = matrix("mass");
+    of.matrices.observe = matrix("observe");
+    of.matrices.act = matrix("act");
     of.components = static_cast<std::size_t>(number_in(specification, "components", 0));
     of.reactions = static_cast<std::size_t>(number_in(specification, "reactions", 1));
     of.in_mode = modes_in(specification, "set_valued");

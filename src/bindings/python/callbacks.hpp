@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "nonsmooth/sized_inclusion.hpp"
 #include "source.hpp"
 
 namespace ricochet::python {
@@ -59,10 +60,10 @@ struct CallbackGuard {
     std::vector<bool> in_mode;  ///< empty: in every mode
 };
 
-/// Set-valued motion: functions, and matrices by rows, which are empty where the default applies.
+/// Set-valued motion.
 struct CallbackInclusion {
     Function smooth, bounds, offset, offset_rate, change, start_mode;
-    std::vector<double> mass, observe, act;
+    detail::SizedMatrices matrices;
     std::size_t components = 0;  ///< of the matrices; 0: none is given
     std::size_t reactions = 1;
     std::vector<bool> in_mode;  ///< empty: in every mode

@@ -1,18 +1,22 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Inclusions whose sizes are known at run time, such as those of callbacks, in the solvers of the
 // sizes that the library has compiled: at most 8 components and 4 reactions, whose sets are boxes.
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "ricochet/detail/branch_phases.hpp"
 #include "ricochet/detail/owner.hpp"
 
 namespace ricochet::detail {
 
+/// A, E and G by rows. Empty: the unit matrix, the first m components, and the transpose of E.
+struct SizedMatrices {
+    std::vector<double> mass, observe, act;
+};
+
 /// A w' = f(t, w) + G r, y = E w - s(t), lower <= r <= upper; see inclusion.hpp. With n components
-/// and m reactions, matrices are stored by rows and arrays have n or m numbers.
+/// and m reactions, arrays have n or m numbers.
 class SizedInclusion {
 public:
     SizedInclusion() = default;
@@ -24,12 +28,10 @@ public:
     [[nodiscard]] virtual std::size_t reactions() const noexcept = 0;
     virtual void smooth(double t, const double* w, double* f) const = 0;
     virtual void bounds(double t, const double* w, double* lower, double* upper) const = 0;
-    /// s and its rate.
-    virtual void offset(double t, double* s, double* rate) const = 0;
-    // Null: the unit matrix, the first m components, and the transpose of E.
-    [[nodiscard]] virtual const double* mass() const noexcept = 0;
-    [[nodiscard]] virtual const double* observe() const noexcept = 0;
-    [[nodiscard]] virtual const double* act() const noexcept = 0;
+    /// s, which is zero where it is not written, and its rate.
+    virtual void offset(double t, double* s) const = 0;
+    virtual void offset_rate(double t, double* rate) const = 0;
+    [[nodiscard]] virtual const SizedMatrices& matrices() const noexcept = 0;
 };
 
 inline constexpr std::size_t most_components = 8, most_reactions = 4;
