@@ -956,8 +956,6 @@ protected:
         if (guarded_) bank_.visit(visit);
     }
 
-    /// Largest number of events of one guard at an instant.
-    static constexpr std::uint32_t most_at_once = 1000;
     static constexpr double stale = std::numeric_limits<double>::quiet_NaN();
     /// Fraction of the last flight of a guard over which a difference quotient is taken: over this
     /// length the rounding of its small excursions is magnified less than over the usual 1e-5 of a

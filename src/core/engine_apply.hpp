@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/engine.hpp"
+#include "core/tolerances.hpp"
 
 namespace ricochet::detail {
 
@@ -56,7 +57,7 @@ inline void EventEngine<X, single>::note_left_alone(bool located)
     left_alone_.clear();
     const X& before = search_.before();
     const X& after = resets_.after();
-    if (before.size() != after.size() || before.size() > 64) return;
+    if (before.size() != after.size() || before.size() > tolerances::remembered_components) return;
     bool any = false;
     for_each_component(
         after, [&](auto i) __attribute__((always_inline)) {
@@ -187,7 +188,7 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::timer_is_endless()
 {
     timer_at_once_ = std::exchange(timer_instant_, instant_) == instant_ ? timer_at_once_ + 1 : 1;
-    return timer_at_once_ == most_at_once || repeats_level({});
+    return timer_at_once_ == tolerances::events_at_once || repeats_level({});
 }
 
 template <class X, bool single>

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "core/engine.hpp"
+#include "core/tolerances.hpp"
 
 namespace ricochet::detail {
 
@@ -53,14 +54,14 @@ bool EventEngine<X, single>::presses(const Rested& rested, Hold& hold)
     // Its first derivative that is not zero decides, which is the one that a short drift shows. The
     // longer one is to be watched: it stands out from rounding by a factor of a million.
     double first = 0;
-    for (double ahead = 1e-5 * h_next_; ahead <= h_next_; ahead *= 16) {
+    for (double ahead = tolerances::of_difference * h_next_; ahead <= h_next_; ahead *= 16) {
         const double moved =
             hold.inward * free_drift({i, step_.time(0), &step_.x0(), ahead, false});
         if (!(std::fabs(moved) > 8 * hold.rounding)) continue;
         if (first == 0) first = moved;
         if (moved * first < 0) break;
         hold.ahead = ahead;
-        if (std::fabs(moved) > 0x1p20 * hold.rounding) break;
+        if (std::fabs(moved) > tolerances::of_drift * hold.rounding) break;
     }
     return first < 0;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/engine.hpp"
+#include "core/tolerances.hpp"
 
 namespace ricochet::detail {
 
@@ -128,7 +129,8 @@ inline bool EventEngine<X, single>::is_rounding_at_set(std::size_t i, const Guar
     const double size = std::fabs(at.value);
     const double moves = std::fabs(at.rate) * std::fabs(step_.time(at.s));
     if (bank_[i].acting || has_left(bank_[i].side, at.value)) return false;
-    if (!(size <= part_by_rounding * std::max(bank_.scale(i, step_.h()), moves))) return false;
+    if (!(size <= tolerances::by_rounding * std::max(bank_.scale(i, step_.h()), moves)))
+        return false;
     return size <= rounding_of(i, step_.mode(), step_.time(at.s), search_.before());
 }
 
@@ -175,7 +177,7 @@ inline Bracket EventEngine<X, single>::bracket_of(const Location& where, double 
     // The condition of an event may hold only some roundings beyond the bracket of its guard.
     const double lo = step_.time(where.lo), hi = step_.time(where.hi);
     const bool is_beyond = backward_ ? t < hi : t > hi;
-    const double roundings = 16 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+    const double roundings = tolerances::of_sum * std::fabs(t);
     return {lo, is_beyond && std::fabs(t - hi) <= roundings ? t : hi};
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/engine.hpp"
+#include "core/tolerances.hpp"
 
 namespace ricochet::detail {
 
@@ -105,10 +106,10 @@ void EventEngine<X, single>::note_excursions()
             rounding = record.noted.rounding = rounding_of(i, step_.mode(), at.value, x);
         }
         // A difference over a part of a step says nothing about a slow guard.
-        if (size > 0x1p20 * rounding || system_->rated || !system_->flow) continue;
+        if (size > tolerances::of_drift * rounding || system_->rated || !system_->flow) continue;
         X rate = x;
         step_.flow_in(step_.mode(), at.value, x, rate);
-        const double scale = 1e5 * low_part * interval;
+        const double scale = tolerances::per_difference * low_part * interval;
         slope = bank_.view(i, step_.mode(), calls()).rate(at.value, x, rate, scale);
     }
 }
@@ -142,7 +143,7 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
         // A guard farther away than an error of location explains does not fade, rising or not.
         // Without a location the reset of another guard may carry it across its surface.
         const double beyond = located_ ? -away - 2 * record.band : -away;
-        if (std::max(away, beyond) > 1024 * rounding) {
+        if (std::max(away, beyond) > tolerances::of_fading * rounding) {
             record.turned = away > 0;
             return false;
         }
@@ -151,20 +152,21 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
     }
     // Excursions are not lost in rounding where the guard came from far away, as from where a time
     // event had put it.
-    const bool came_far = low && std::fabs(bank_.g0(i)) > 1024 * rounding;
+    const bool came_far = low && std::fabs(bank_.g0(i)) > tolerances::of_fading * rounding;
     bool lost = false;
     if (!system_->rated) {
         if (low) {
-            double part = 1e-5 * h_next_;
+            double part = tolerances::of_difference * h_next_;
             if (std::fabs(rate) * part <= rounding) {
                 part = std::max(part, low_part * record.intervals.interval());
-                rate = departure(i, 1e5 * part);
+                rate = departure(i, tolerances::per_difference * part);
             }
             // A difference of a unit in the last place does not determine the direction.
             lost = std::fabs(rate) * part <= rounding / 8;
             // It stands still where its reset has put it, to second order.
             if (lost && came_far && !jump_lost &&
-                std::fabs(rate_ahead(i, part, 1e5 * part)) * part <= rounding / 8) {
+                std::fabs(rate_ahead(i, part, tolerances::per_difference * part)) * part <=
+                    rounding / 8) {
                 return false;
             }
             if (lost) rate = 0;
@@ -241,8 +243,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     if (timed_) ahead = std::min(ahead, step_.until(time_event_));
     // The rest of the state stands still while the time jumps to the limit of the events: a moving
     // floor would separate from the other bodies, or pass through them.
-    if (bank_.size() > 1 &&
-        ahead > 4 * std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value)) {
+    if (bank_.size() > 1 && ahead > tolerances::of_time * std::fabs(step_.start().value)) {
         error += std::exchange(ahead, 0);
     }
     if (bank_.keeps_rows()) error += error_by_rounding(bank_[i].intervals.interval());

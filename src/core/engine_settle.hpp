@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "core/engine.hpp"
+#include "core/tolerances.hpp"
 
 namespace ricochet::detail {
 
@@ -92,7 +93,7 @@ inline std::size_t EventEngine<X, single>::endless_guard()
         GuardRecord& record = bank_[i];
         record.at_once =
             std::exchange(record.instant, instant_) == instant_ ? record.at_once + 1 : 1;
-        if (record.at_once == most_at_once) return i;
+        if (record.at_once == tolerances::events_at_once) return i;
     }
     return repeats_level(fired) ? fired[0] : no_guard;
 }
@@ -345,11 +346,11 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
     const auto guard = bank_.view(i, step_.mode(), calls());
     const double moved = guard.rate(t, step_.x0(), left_rate_, h_next_);
     // Along the flow that was left it stood, or moved the other way, by more than rounding.
-    const double noise = 64 * std::numeric_limits<double>::epsilon() *
-                         std::fabs(bank_.complete_rate0(i, step_, h_next_, calls()));
+    const double noise =
+        tolerances::of_location * std::fabs(bank_.complete_rate0(i, step_, h_next_, calls()));
     if (sign_of(side) * moved > noise) return false;
     if (sign_of(side) * moved >= -noise) {  // a vanishing rate has the sign that it has later
-        const double ahead = 1e-6 * h_next_;
+        const double ahead = tolerances::of_heading * h_next_;
         const double then = step_.inside(step_.time(ahead));
         X rate = left_rate_;
         X later = step_.x0();
@@ -402,7 +403,7 @@ inline bool EventEngine<X, single>::lies_within_rounding(std::size_t i)
     const double rate = system_->bounded ? bank_.complete_rate0(i, step_, h_next_, calls())
                                          : bank_.rate0(i);  // which may not be known otherwise
     const double moves = std::fabs(rate) * (std::fabs(step_.time(0)) + h_next_);
-    if (!(std::fabs(g) <= part_by_rounding * std::max(bank_.armed_scale(i, h_next_), moves)))
+    if (!(std::fabs(g) <= tolerances::by_rounding * std::max(bank_.armed_scale(i, h_next_), moves)))
         return false;
     return std::fabs(g) <= rounding_of(i);
 }
@@ -435,13 +436,13 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
     if (rate != 0 && bank_[i].fired) return side_of(rate);
     // The second derivative has the sign that the rate will have a little later. A rate that it
     // cancels within the rounding of the time counts as zero, as does a rate that is only rounding.
-    const double delta = 1e-6 * h_next_;
+    const double delta = tolerances::of_heading * h_next_;
     const double next = rate_ahead(i, delta, h_next_);
-    const double moment =
-        64 * std::numeric_limits<double>::epsilon() * (std::fabs(step_.time(0)) + h_next_);
+    const double moment = tolerances::of_location * (std::fabs(step_.time(0)) + h_next_);
     double noise = std::fabs(next - rate) * std::min(moment / delta, 0.5);
     if (!system_->rated) {
-        if (!bank_[i].fired) noise = std::max(noise, rounding_of(i) / (1e-5 * h_next_));
+        if (!bank_[i].fired)
+            noise = std::max(noise, rounding_of(i) / (tolerances::of_difference * h_next_));
     }
     if (std::fabs(rate) > noise) return side_of(rate);
     // A guard of the position whose force is zero, too, leaves by its jerk.
@@ -479,7 +480,7 @@ inline double EventEngine<X, single>::rounding_of(std::size_t i)
 template <class X, bool single>
 inline double EventEngine<X, single>::rounding_of(std::size_t i, Mode mode, double t, const X& x)
 {
-    constexpr double nudge = 8 * std::numeric_limits<double>::epsilon();
+    constexpr double nudge = tolerances::of_state;
     const auto guard = bank_.view(i, mode, calls());
     const double g = guard.value(t, x);
     double beside = t * (1 + nudge);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/engine.hpp"
+#include "core/tolerances.hpp"
 
 namespace ricochet::detail {
 
@@ -12,7 +13,7 @@ inline bool EventEngine<X, single>::may_tie(std::size_t i) const noexcept
     if (!record.enabled || record.deferred || record.info.boolean) return false;
     if (!record.acting && !time_event_due_) return false;
     if (!counts(record.side, record.info.crossing)) return false;
-    return std::fabs(bank_.g1(i)) <= part_by_rounding * bank_.scale(i, step_.h());
+    return std::fabs(bank_.g1(i)) <= tolerances::by_rounding * bank_.scale(i, step_.h());
 }
 
 template <class X, bool single>
@@ -38,7 +39,7 @@ double EventEngine<X, single>::rate_of_tie(std::size_t i)
     const double rate = rate_at(t, step_.x1(), step_.rate1());
     const double slope = std::fabs(rate);
     if (!(sign * rate < 0) || !std::isfinite(slope)) return 0;
-    const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+    const double ulps = tolerances::of_time * std::fabs(t);
     const double reach = std::max(ulps, rounding_of(i, step_.mode(), t, step_.x1()) / slope);
     if (!(std::fabs(g) <= 2 * slope * reach)) return 0;
     // A touch has a rate there that is itself no more than rounding.
@@ -49,7 +50,7 @@ double EventEngine<X, single>::rate_of_tie(std::size_t i)
     X near = step_.x1();
     for_each_component(near, [&](auto c) {
         const double kept = near[c];
-        near[c] = kept * (1 + 8 * std::numeric_limits<double>::epsilon());
+        near[c] = kept * (1 + tolerances::of_state);
         if (near[c] != kept) noise += std::fabs(rate_at(t, near, step_.rate1()) - rate);
         near[c] = kept;
     });

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "core/tolerances.hpp"
 #include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detect/step_probe.hpp"
@@ -16,13 +17,6 @@
 #include "ricochet/integrate/options.hpp"
 
 namespace ricochet::detail {
-
-/// The part of its scale in a step up to which a guard may be at its surface by rounding alone: a
-/// test that costs nothing, before the rounding is computed. That is 8 units in the last place of
-/// the terms of the guard, which for guards without cancellation is 2^-49 of their scale: terms may
-/// be 2^29 times as large as what is left of them in the step. A guard that moves by its scale in
-/// the step crosses, if rounding alone decides, within the same part of the step beyond its end.
-inline constexpr double part_by_rounding = 0x1p-20;
 
 /// Resolution of events at a given time.
 class EventResolution {
@@ -46,7 +40,7 @@ public:
     /// Distance in time [s] up to which two events cannot be told apart.
     [[nodiscard]] double blur(double t) const noexcept
     {
-        return std::max(tolerance(t), 4 * std::numeric_limits<double>::epsilon() * std::fabs(t));
+        return std::max(tolerance(t), tolerances::of_time * std::fabs(t));
     }
 
     /// Distance in time [s] up to which two events happen together.
@@ -139,7 +133,7 @@ struct Hit {
 /// there, or near tangency in a long step. The search then continues behind them.
 class Creep {
 public:
-    explicit Creep(double h) noexcept : reach_(0x1p-30 * std::fabs(h)) {}
+    explicit Creep(double h) noexcept : reach_(tolerances::of_creep * std::fabs(h)) {}
 
     /// Whether the event at the offset `root`, after one at `from`, is one too many of them.
     [[nodiscard]] bool is_too_long(double from, double root) noexcept

@@ -19,6 +19,7 @@
 #include "core/guard_bank.hpp"
 #include "core/step.hpp"
 #include "core/step_cover.hpp"
+#include "core/tolerances.hpp"
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/resolved_parts.hpp"
 #include "ricochet/detail/series_guard.hpp"
@@ -272,7 +273,7 @@ public:
     /// Remembers the same for all components, since repeats of the step forget it.
     void keep_lost(const CurrentStep& step)
     {
-        if (before_.size() > 64) return;
+        if (before_.size() > tolerances::remembered_components) return;
         for (std::size_t c = 0; c < static_cast<std::size_t>(before_.size()); ++c) {
             lost_[static_cast<decltype(before_.size())>(c)] = lost_at_set(step, c);
         }
@@ -377,7 +378,7 @@ private:
     /// of length s moves it by a few ulp(s).
     [[nodiscard]] double reach_of(const CurrentStep& step, double s) const noexcept
     {
-        const double rounding = 64 * std::numeric_limits<double>::epsilon() * s;
+        const double rounding = tolerances::of_location * s;
         return std::max(resolution_.blur(step.time(s)), rounding);
     }
 
@@ -603,10 +604,12 @@ private:
     [[nodiscard]] static bool ends_within_rounding(Probe& probe, const Watch& watch, double slope)
     {
         if (side_of(watch.end.value) == watch.side) return false;
-        constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
+        constexpr double ulps = tolerances::of_location;
         const double width = watch.end.s - watch.start.s;
         const bool brief = width <= ulps * std::fabs(probe.step().time(watch.end.s));
-        if (!brief && !(std::isfinite(slope) && width <= 0x1p-20 * probe.step().h())) return false;
+        if (!brief &&
+            !(std::isfinite(slope) && width <= tolerances::by_rounding * probe.step().h()))
+            return false;
         const double blur = probe.blur(watch.end.s);
         return std::fabs(watch.end.value) <= blur && (brief || width * std::fabs(slope) <= blur);
     }
@@ -806,7 +809,7 @@ private:
         goes_straight_ = probe.is_settled() && !hit.where.jump;
         if (!goes_straight_) return;
         assign(rate_, space_.dxdt);
-        if (before_.size() > 64) return;
+        if (before_.size() > tolerances::remembered_components) return;
         at_ = hit.where.root;
         at_remainder_ = hit.where.root_remainder;
         has_lost_ = true;

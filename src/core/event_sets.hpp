@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/event_search.hpp"
+#include "core/tolerances.hpp"
 
 namespace ricochet::detail {
 
@@ -237,7 +238,7 @@ double EventSearch<X, single>::go_beyond(const CurrentStep& step, Bank& bank, st
                                          std::uint64_t& calls)
 {
     const double t0 = step.time(at_);
-    const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(t0);
+    const double ulps = tolerances::of_time * std::fabs(t0);
     const Location& place = where(i);
     const double most =
         std::max(place.hi - at_, 0.0) + std::max(ulps, finest_bracket(at_, step.h()));

@@ -13,6 +13,7 @@
 
 #include "core/screened_guards.hpp"
 #include "core/step.hpp"
+#include "core/tolerances.hpp"
 #include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/quiet_run.hpp"
@@ -237,7 +238,7 @@ public:
     /// Same tolerance as `touch`, for an interval in which |g| reaches `largest`.
     [[nodiscard]] double touch_of(std::size_t i, double largest) const noexcept
     {
-        constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
+        constexpr double ulps = tolerances::of_location;
         return larger(records_[i].info.touch, ulps * largest);
     }
 
@@ -343,7 +344,7 @@ public:
         if (!rules_.coarse) return 0;
         const double size = std::fmax(sizes_[i], std::fmax(std::fabs(g0_[i]), std::fabs(g1_[i])));
         const double rate = std::fmin(std::fabs(rate0_[i]), std::fabs(rate1_[i]));
-        const double width = 4 * std::numeric_limits<double>::epsilon() * size / rate;
+        const double width = tolerances::of_time * size / rate;
         return width <= 1e-10 * h ? width : 1e-10 * h;
     }
 

@@ -27,6 +27,7 @@
 
 #include "core/engine.hpp"
 #include "core/initial_step.hpp"
+#include "core/tolerances.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/lending_loop.hpp"
 #include "ricochet/detail/step_control.hpp"
@@ -650,7 +651,7 @@ private:
     }
     [[nodiscard]] static double rounding(double t) noexcept
     {
-        return 4 * std::numeric_limits<double>::epsilon() * std::fabs(t);
+        return tolerances::of_time * std::fabs(t);
     }
     /// Whether the step starts where a set has happened: the samples there are the state after it.
     [[nodiscard]] bool starts_at_set() const noexcept;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/loop.hpp"
+#include "core/tolerances.hpp"
 
 namespace ricochet::detail {
 
@@ -39,7 +40,8 @@ inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& ho
     }
     if (watching_) return check_all();
     const double t = step_.time(step_.h());
-    const double margin = this->ends_on_time() ? part_by_rounding * step_.h() : 0;  // for ties
+    const double margin =
+        this->ends_on_time() ? tolerances::by_rounding * step_.h() : 0;  // for ties
     const double ends = (backward_ ? -t : t) + margin;
     if (planner_->covers(ends)) {
         planner_->sample_sleeper(step_, bank_, run_.statistics);

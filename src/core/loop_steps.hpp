@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/loop.hpp"
+#include "core/tolerances.hpp"
 
 namespace ricochet::detail {
 
@@ -169,10 +170,10 @@ inline bool Loop<X, single>::take_step(double remaining)
         if (ahead <= remaining) {
             longest = ahead;
             // A remainder of a millionth of a step is rounding, not a step.
-            time_event_due_ = h_next_ * (1 + 1e-6) >= longest;
+            time_event_due_ = h_next_ * (1 + tolerances::of_remainder) >= longest;
         }
     }
-    const bool to_the_end = h_next_ * (1 + 1e-6) >= longest;
+    const bool to_the_end = h_next_ * (1 + tolerances::of_remainder) >= longest;
     is_last_ = to_the_end && longest == remaining;
     const double h = to_the_end ? longest : h_next_;
     step_.pin(to_the_end ? h : std::numeric_limits<double>::quiet_NaN(),

@@ -8,6 +8,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/tolerances.hpp"
 #include "ricochet/detail/instant.hpp"
 
 namespace ricochet::detail {
@@ -19,7 +20,7 @@ public:
     /// slowly.
     [[nodiscard]] bool wants_rounding(double size) const noexcept
     {
-        return !(size > 1024 * rounding_ && age_ < most_age);
+        return !(size > tolerances::of_fading * rounding_ && age_ < most_age);
     }
     void keep_rounding() noexcept { ++age_; }
     void set_rounding(double rounding) noexcept

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "core/guard_bank.hpp"
+#include "core/tolerances.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/system_table.hpp"
 #include "ricochet/hybrid/guard.hpp"
@@ -475,7 +476,7 @@ private:
             const double from = at(before, c), to = at(member.result, c);
             size = std::max({size, std::fabs(from), std::fabs(to), std::fabs(to - from)});
         }
-        member.rounding = 16 * std::numeric_limits<double>::epsilon() * size;
+        member.rounding = tolerances::of_sum * size;
     }
 
     [[nodiscard]] static std::size_t size_of(const X& x) noexcept

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "core/engine.hpp"
+#include "core/tolerances.hpp"
 #include "ricochet/detail/monitor_core.hpp"
 
 namespace ricochet::detail {
@@ -290,8 +291,7 @@ private:
         const Instant start = step.start();
         const double end = start.after(backward_ ? -step.h : step.h).value;
         const double ahead = backward_ ? -start.until(time_event_) : start.until(time_event_);
-        const double rounding =
-            8 * std::numeric_limits<double>::epsilon() * std::fabs(end) + 1e-12 * step.h;
+        const double rounding = tolerances::of_state * std::fabs(end) + 1e-12 * step.h;
         if (ahead < step.h - rounding) throw_beyond_time_event(time_event_, end);
         return ahead <= step.h + rounding;
     }

@@ -22,6 +22,7 @@
 #include "core/guard_bank.hpp"
 #include "core/metering.hpp"
 #include "core/tentative_steps.hpp"
+#include "core/tolerances.hpp"
 #include "ricochet/detect/planned.hpp"
 #include "ricochet/integrate/run.hpp"
 
@@ -419,7 +420,7 @@ private:
         }
         const double reach = band(bank, i, at.value, at.value);
         // Rounding of the time must not lengthen the covered interval.
-        const double ulps = 4 * std::numeric_limits<double>::epsilon() * std::fabs(at.time);
+        const double ulps = tolerances::of_time * std::fabs(at.time);
         check.sure = at.time + detector_->sure(self_, at.bound, reach) - ulps;
         const double cleared = horizon(at, mode);
         check.unclear = gated_ && !(cleared > 0);
@@ -444,7 +445,7 @@ private:
     /// Whether a guard may tie with the end of the step, before which it has not crossed.
     [[nodiscard]] static bool ties(const Step<X>& step, double from, double to) noexcept
     {
-        return step.is_pinned() && std::fabs(to) <= part_by_rounding * std::fabs(from);
+        return step.is_pinned() && std::fabs(to) <= tolerances::by_rounding * std::fabs(from);
     }
 
     [[nodiscard]] bool never_sleeps(const GuardRecord& record) const noexcept

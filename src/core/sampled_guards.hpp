@@ -8,6 +8,7 @@
 #include <span>
 
 #include "core/guard_record.hpp"
+#include "core/tolerances.hpp"
 #include "core/wide.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/guard_view.hpp"
@@ -107,7 +108,8 @@ protected:
         } else if (system_->each_rate && !selective_ && !backward_) {
             system_->each_rate(system_.door(), at.motion, all(rates));
         } else if (!system_->each_rate && !system_->guard_alone) {
-            const bool is_cut = system_.is_near_end(at.motion.t, 1e-5 * at.scale);
+            const bool is_cut =
+                system_.is_near_end(at.motion.t, tolerances::of_difference * at.scale);
             if (is_cut) {
                 if (g) {
                     for (std::size_t i = 0; i < size(); ++i) rates[i] = (*g)[i];
@@ -152,7 +154,7 @@ protected:
     /// Rates of all guards by the central difference along the flow, in two calls.
     void difference(const SamplePoint<X>& at, Doubles& rates)
     {
-        const double delta = 1e-5 * at.scale;
+        const double delta = tolerances::of_difference * at.scale;
         const double ahead = backward_ ? -delta : delta;
         if (there_.size() != at.motion.x.size()) there_ = at.motion.x;
         detail::move(there_, at.motion.x, delta, at.motion.s);
@@ -168,7 +170,8 @@ protected:
     /// `rates`.
     void difference_inside(const SamplePoint<X>& at, Doubles& rates)
     {
-        const double delta = system_.span()->inward(at.motion.t, 1e-5 * at.scale);
+        const double delta =
+            system_.span()->inward(at.motion.t, tolerances::of_difference * at.scale);
         if (there_.size() != at.motion.x.size()) there_ = at.motion.x;
         const auto guards = [&](double later, Doubles& g) {
             detail::move(there_, at.motion.x, backward_ ? -later : later, at.motion.s);
@@ -188,13 +191,14 @@ protected:
     {
         if constexpr (single || is_small<X>) return false;
         return size() > 1 && !system_->each_rate && !system_->rated && !system_->guard_on &&
-               system_->calls_of_rate == 2 && !system_.is_near_end(at.motion.t, 1e-5 * at.scale);
+               system_->calls_of_rate == 2 &&
+               !system_.is_near_end(at.motion.t, tolerances::of_difference * at.scale);
     }
 
     /// Differences of guards that are evaluated one by one, at the same two states.
     void difference_each(const SamplePoint<X>& at, std::uint64_t& calls, Doubles& rates)
     {
-        const double delta = 1e-5 * at.scale;
+        const double delta = tolerances::of_difference * at.scale;
         const double ahead = backward_ ? -delta : delta;
         if (there_.size() != at.motion.x.size()) there_ = at.motion.x;
         const auto sample = [&](double s, double later, Doubles& g) {

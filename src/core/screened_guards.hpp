@@ -14,6 +14,7 @@
 
 #include "core/sampled_guards.hpp"
 #include "core/step.hpp"
+#include "core/tolerances.hpp"
 #include "core/wide.hpp"
 #include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/series_guard.hpp"
@@ -140,7 +141,8 @@ public:
     [[nodiscard]] bool clear_as_cubics(double h) const noexcept
     {
         if (!linear_ || waiting_) return false;
-        constexpr double rounding = 0x1p-20;  // of rates that are differences, with a reserve
+        constexpr double rounding =
+            tolerances::by_rounding;  // of rates that are differences, with a reserve
         return !any_of([ this, h ](std::size_t i) __attribute__((always_inline)) {
             const CubicCheck look = cubic(i, h);
             const bool known = is_finite(look.b1 + look.b2);
@@ -180,7 +182,7 @@ public:
         {
             const CubicCheck look = cubic(i, h);
             const double e = deviation(look, i, h, CubicCheck::inside, inside_[i]);
-            return sign_[i] != 0 && !(0x1p30 * e <= look.size());
+            return sign_[i] != 0 && !(e <= tolerances::of_exact_cubic * look.size());
         };
         if (!are_few() && marked_) {
             for (const std::size_t i : marks_) {
@@ -228,7 +230,7 @@ public:
                                                     double e) const noexcept
     {
         if (has_series(i)) return false;
-        return !checked() || 0x1p16 * e <= cubic(i, h).size();
+        return !checked() || e <= tolerances::of_plain_cubic * cubic(i, h).size();
     }
 
     /// Largest deviation found of guard i in the step from the cubic through its ends; infinite if
@@ -240,7 +242,7 @@ public:
     /// Whether such a deviation moves a root of guard i by less than `straight_part` of the step.
     [[nodiscard, gnu::always_inline]] bool is_cubic(std::size_t i, double e) const noexcept
     {
-        return 0x1p26 * e <= std::fabs(g1_[i] - g0_[i]);
+        return e <= tolerances::of_cubic_root * std::fabs(g1_[i] - g0_[i]);
     }
 
     /// Whether the guards have been evaluated inside the step.

@@ -16,6 +16,7 @@
 
 #include "core/held_flow.hpp"
 #include "core/phase_table.hpp"
+#include "core/tolerances.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/detail/instant.hpp"
@@ -339,7 +340,7 @@ public:
     {
         assign(rate, state_.x1);
         flow(state_.h, state_.x1, rate);
-        const double part = kernel_->series ? 1e-6 : 16 * std::numeric_limits<double>::epsilon();
+        const double part = kernel_->series ? 1e-6 : tolerances::of_sum;
         bool alike = true;
         for_components([&](auto i) {
             const double size = std::fabs(state_.rate0[i]) + std::fabs(state_.rate1[i]);
@@ -682,7 +683,7 @@ private:
     /// Large states are not copied: their remainders are dropped at events.
     void keep_departure(double s, const X& w) const
     {
-        if (w.size() > 64) return;
+        if (w.size() > tolerances::remembered_components) return;
         departed_ = s;
         departed_from_ = state_.start.value;
         assign(departure_, w);
@@ -717,7 +718,7 @@ private:
         assign(there, x);  // which has its dimension
         flow_in(state_.mode, t, x, there);
         const auto rounding = [&](auto i) {
-            return 16 * std::numeric_limits<double>::epsilon() *
+            return tolerances::of_sum *
                    (std::fabs(unused_rate_[i]) + std::fabs(there[i]) + std::fabs(state_.rate0[i]));
         };
         const auto differ = [&](auto i) {
