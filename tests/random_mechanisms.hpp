@@ -11,7 +11,7 @@
 
 #include "problems/rolling_ball.hpp"
 #include "random_inclusions.hpp"
-#include "ricochet/nonsmooth/solvers.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
 #include "ricochet/systems/two_contact_block.hpp"
 #include "ricochet/systems/woodpecker.hpp"

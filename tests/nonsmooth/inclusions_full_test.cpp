@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "inclusions_of_six.hpp"
+#include "exact_inclusions.hpp"
 #include "random_inclusions.hpp"
 #include "random_mechanisms.hpp"
 

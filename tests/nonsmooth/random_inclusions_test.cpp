@@ -1,8 +1,7 @@
 // Random inclusions with several relays, contacts and diodes, against backward Euler.
 
 #include "random_inclusions.hpp"
-#include "inclusions_of_six.hpp"
-#include "ricochet/nonsmooth/solvers.hpp"
+#include "exact_inclusions.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <random>
 
 #include "problems/super_twisting.hpp"
-#include "ricochet/nonsmooth/solvers.hpp"
+#include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
 

@@ -1,3 +1,0 @@
-#include "ricochet/nonsmooth/solvers.hpp"
-
-RICOCHET_INCLUSIONS_OF(6, 5, )
