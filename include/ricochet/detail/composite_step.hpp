@@ -66,7 +66,8 @@ template <int N, int M>
 [[nodiscard]] bool has_dependent_reactions(const AnyMatrices<N, M>& m)
 {
     if (m.reactions() > 64) return false;
-    Eigen::MatrixXd w = m.observe() * (m.inverse_mass() * m.act());
+    const Eigen::Index own = m.own_reactions();
+    Eigen::MatrixXd w = (m.observe() * (m.inverse_mass() * m.act())).topLeftCorner(own, own);
     return invert(w, w) < w.rows();
 }
 

@@ -46,6 +46,10 @@ struct RICOCHET_ALIGNED LinearInequality {
     /// Number of pairs, at most M, where that is fixed. Those behind it have no part in W; they are
     /// at the lower bound, 0, of a set of reactions, and inside a set of states.
     Eigen::Index unknowns = M;
+    /// Whether the pairs of some choice of branches may depend on one another. Their reactions are
+    /// then the nearest to `near` of those that hold their y.
+    bool dependent = false;
+    Vector near;
 
     /// The first component whose interval is empty or has a bound that is not a number; -1 if
     /// there is none.
@@ -148,6 +152,12 @@ private:
         if (confines == Confines::reaction) return 0;
         return branch == Branch::lower ? lower[i] : upper[i];
     }
+
+    /// Reactions of held pairs that depend on one another: the nearest to `near`, in units of
+    /// 1 / sqrt(W_ii), or not finite where they cannot hold all y. False where they are
+    /// independent.
+    [[nodiscard]] bool nearest_on(const Branches& branches, const Vector& b,
+                                  Vector& reaction) const;
 
     /// Whether pair i is off its branch by more than the rounding of the products.
     [[nodiscard]] bool leaves(Eigen::Index i, Branch branch, const Vector& reaction,
@@ -328,7 +338,7 @@ bool LinearInequality<M>::solve_on(const Branches& branches, Vector& reaction, V
     }
     if constexpr (M == 1) {
         reaction[0] = b[0] / a(0, 0);
-    } else {
+    } else if (!dependent || !nearest_on(branches, b, reaction)) {
         reaction = a.partialPivLu().solve(b);
     }
     if (!reaction.allFinite()) return false;
@@ -337,6 +347,48 @@ bool LinearInequality<M>::solve_on(const Branches& branches, Vector& reaction, V
         if (held(branches[i])) y[i] = target(i, branches[i]);
     }
     return y.allFinite();
+}
+
+template <int M>
+bool LinearInequality<M>::nearest_on(const Branches& branches, const Vector& b,
+                                     Vector& reaction) const
+{
+    constexpr int most = M == Eigen::Dynamic ? Eigen::Dynamic : M;
+    using Block = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, most, most>;
+    using Column = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, most, 1>;
+    const Eigen::Index m = y0.size();
+    Eigen::Index size = 0;
+    for (Eigen::Index i = 0; i < m; ++i) size += held(branches[i]) && w(i, i) > 0;
+    if (size < 2) return false;
+    // With a diagonal of ones, so that the rank does not depend on units.
+    Column root(size), left(size);
+    Block scaled(size, size);
+    const auto each_held = [&](auto&& visit) {
+        for (Eigen::Index i = 0, k = 0; i < m; ++i) {
+            if (held(branches[i]) && w(i, i) > 0) visit(i, k++);
+        }
+    };
+    each_held([&](Eigen::Index i, Eigen::Index k) { root[k] = std::sqrt(w(i, i)); });
+    each_held([&](Eigen::Index i, Eigen::Index k) {
+        left[k] = b[i];
+        each_held([&](Eigen::Index j, Eigen::Index l) {
+            scaled(k, l) = w(i, j) / (root[k] * root[l]);
+            left[k] -= w(i, j) * near[j];
+        });
+        left[k] /= root[k];
+    });
+    Eigen::CompleteOrthogonalDecomposition<Block> factor;
+    factor.setThreshold(1e-12);
+    factor.compute(scaled);
+    if (factor.rank() == size) return false;
+    const Column change = factor.solve(left);
+    const double missed = (scaled * change - left).cwiseAbs().maxCoeff();
+    if (!(missed <= 1e-10 * left.cwiseAbs().maxCoeff())) {
+        reaction.setConstant(std::numeric_limits<double>::quiet_NaN());  // they cannot hold all y
+        return true;
+    }
+    each_held([&](Eigen::Index i, Eigen::Index k) { reaction[i] = near[i] + change[k] / root[k]; });
+    return true;
 }
 
 #if RICOCHET_ALIGNED_AS_LIBRARY

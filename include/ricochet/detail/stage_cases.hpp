@@ -34,6 +34,7 @@ public:
     [[nodiscard]] StageReport solve(const StageOptions& options, State& w, Reaction& reaction)
     {
         auto& inequality = scratch_.inequality;
+        inequality.near = reaction;
         scratch_.m.offset(stage_.t, scratch_.s);
         scratch_.m.smooth(stage_.t, w, scratch_.f);
         StageReport best;

@@ -60,6 +60,8 @@ AnyStep<N, M>::AnyStep(const AnyInclusion<N, M>& inclusion, const SchemeOptions&
         refuse_inclusion("cases need a box of at most four reactions, not",
                          static_cast<double>(matrices_.reactions()));
     }
+    scratch_.inequality.dependent =
+        box && matrices_.own_reactions() > 1 && has_dependent_reactions(matrices_);
     const Eigen::Index n = matrices_.size();
     for (Vector* v : {&f_, &stage_.q}) v->setZero(n);
     middle_.w.setZero(n);
