@@ -1072,6 +1072,42 @@ TEST(Meaning, NoFunctionIsCalledInAModeThatHasBeenLeftByAnEventOfACycle)
     });
 }
 
+TEST(Meaning, EachEventCallsItsResetOnce)
+{
+    struct Waves {
+        using State = Array<1>;
+        int* calls;
+        static void flow(double, const State&, State& dxdt) { dxdt = {1}; }
+        [[nodiscard]] static double guard(double, const State& x) { return std::sin(x[0]); }
+        void reset(double, State&) const { ++*calls; }
+    };
+    int calls = 0;
+    // Steps of 1, so that the signs at their ends show every crossing, too.
+    by_all(Waves{&calls}, Array<1>{0.5}, {.t_end = 100, .h_max = 1},
+           [&](const auto& run, const std::string& label) {
+               EXPECT_EQ(run.events.size(), 16U) << label;
+               EXPECT_EQ(std::exchange(calls, 0), 16) << label;
+           });
+}
+
+TEST(Meaning, ACreepingStateSatisfiesItsConditionAtItsEvent)
+{
+    // 4 units in the last place of 1 at a rate of 1e-15: the event lies within the rounding of x
+    // over its rate of 0.888.
+    struct Creeping {
+        using State = Array<1>;
+        static void flow(double, const State&, State& dxdt) { dxdt = {-1e-15}; }
+        [[nodiscard]] static double guard(double, const State& x) { return x[0] - 1; }
+        static void reset(double, State&) {}
+    };
+    by_all(Creeping{}, Array<1>{1 + 0x1p-50}, {.t_end = 4},
+           [](const auto& run, const std::string& label) {
+               ASSERT_EQ(run.events.size(), 1U) << label;
+               EXPECT_NEAR(run.events[0].t, 0.888, 0.2) << label;
+               EXPECT_LE(run.events[0].before[0], 1) << label;
+           });
+}
+
 // --- runs that follow each other ---
 
 TEST(Meaning, ARunThatStartsBeforeItsSurfaceByARoundingHasItsEvent)
