@@ -105,7 +105,7 @@ void EventEngine<X, single>::note_excursions()
         const double size = size_of_excursion(i, slope, interval);
         Excursions& excursions = record.excursions;
         const bool wants = excursions.wants_rounding(size);
-        const bool known = wants || excursions.loss().wants_rounding(size) || single;
+        const bool known = wants || single;  // whose rounding may depend on the mode
         record.noted.rounding = known ? rounding_of(i, step_.mode(), at.value, x) : stale;
         const double rounding = wants ? record.noted.rounding : excursions.rounding();
         // A difference over a part of a step says nothing about a slow guard.

@@ -25,25 +25,22 @@ namespace ricochet::detail {
 /// with the largest loss counts.
 class LossByRounding {
 public:
-    /// Whether an excursion of that size needs `see` with the rounding at its end.
-    [[nodiscard]] bool wants_rounding(double size) const noexcept
-    {
-        return size <= 1024 * coarsest_;
-    }
     /// Records the excursion of that size that ended at t [s] after an interval [s]. Of a guard
     /// that has several surfaces, one in each mode, each has its own rounding.
     void see(double t, double interval, double size, double rounding) noexcept
     {
-        coarsest_ = std::fmax(rounding, coarsest_);
-        if (!(size < first_size_)) {
-            first_size_ = size;
-            first_slope_ = size / interval;
+        if (!(size > 0)) return;
+        // Where the rate does not fall as excursions do, as of levels, no energy is lost; where
+        // they grow, another motion has begun.
+        const double rate = size / interval;
+        const double steepness = rate * rate * (rate * rate) / size;
+        if (!(steepness < steepest_)) {
+            if (size < size_) return;
+            steepest_ = steepness;
             weight_ = part_ = 0;
+            return;
         }
-        // Where the rate does not fall as excursions do, as of levels, no energy is lost.
-        const double slower = first_slope_ / (size / interval);
-        if (!(slower * slower * slower * slower > first_size_ / size)) return;
-        const double weight = rounding * size / (interval * interval);
+        const double weight = rounding * rate / interval;
         if (!(2 * weight >= weight_)) return;
         const double decay = size < size_ ? 1 - size / size_ : 1;
         size_ = size;
@@ -66,9 +63,7 @@ public:
         visit(size_);
         visit(weight_);
         visit(part_);
-        visit(coarsest_);
-        visit(first_size_);
-        visit(first_slope_);
+        visit(steepest_);
     }
 
 private:
@@ -76,8 +71,7 @@ private:
     double size_ = 0;    ///< of it, or of the last one
     double weight_ = 0;  ///< rounding times acceleration, of which the loss is the root
     double part_ = 0;    ///< of the remaining time that is lost
-    double coarsest_ = 0;
-    double first_size_ = 0, first_slope_ = 0;  ///< of the largest excursion, on average
+    double steepest_ = 0;
 };
 
 /// Excursions of one guard from its surface, from one acting instant to its event at the next.
