@@ -41,7 +41,7 @@ struct SampledController {
             const bool settled = std::fabs(result - x[held]) < 1e-6;
             x[computed] = result;
             x[due] = t + delay;
-            if (settled) throw ricochet::Stop("the plant has settled");
+            if (settled) throw ricochet::StopRun("the plant has settled");
         }
     }
 };

@@ -397,7 +397,7 @@ public:
     [[nodiscard]] Outcome outcome() const noexcept { return monitor_->run().outcome; }
     /// The guard that ended the run, or `no_guard`.
     [[nodiscard]] std::size_t guard() const noexcept { return monitor_->run().guard; }
-    /// Text of the `Stop` that ended the run.
+    /// Text of the `StopRun` that ended the run.
     [[nodiscard]] const std::string& reason() const noexcept { return monitor_->run().reason; }
     [[nodiscard]] const Statistics& statistics() const noexcept
     {

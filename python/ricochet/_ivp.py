@@ -49,7 +49,7 @@ _WORDS = (("t_end - t_start", "t_span[1] - t_span[0]"), ("t_end", "t_span[1]"),
           ("the start lies", "y0 lies"), ("expected guard >= 0", "expected a value >= 0"),
           ("; g >= 0 bounds", "; event >= 0 bounds"), ("step must", "first_step must"),
           ("a guard with stop_after, stop_at_event, or max_steps, also beside a reset that ends the "
-           "run by Stop", "a terminal event or max_steps"))
+           "run", "a terminal event or max_steps"))
 
 
 def _in_our_words(error, events):

@@ -846,12 +846,29 @@ protected:
 
     /// Whether guard i, on its surface at x⁻ and at x⁺ and about to enter `side`, has its event
     /// here: the set has changed the mode (or a sign in the state that the guard reads, if it
-    /// belongs to the set; or its time event has changed the state or the flow), and along the flow
-    /// that was left it did not move that way. A crossing that merely goes on in another mode is
-    /// the same event.
+    /// belongs to the set; or `is_set_in_motion`), and along the flow that was left it did not move
+    /// that way. A crossing that merely goes on in another mode is the same event.
     [[nodiscard]] bool leaves_at_once(std::size_t i, Side side);
-    /// Whether the time event of the set has changed the state or the flow.
-    [[nodiscard]] bool changes_on_time();
+    /// Whether the set may have set guard i in motion, without a change of mode: a time event has
+    /// changed the state or the flow, or the resets of other guards have, and guard i stood on its
+    /// surface since the start or its last event.
+    [[nodiscard]] bool is_set_in_motion(std::size_t i);
+    /// Whether guard i stands on its surface, and no side is known from which it came.
+    [[nodiscard]] bool stands(std::size_t i) const noexcept
+    {
+        const GuardRecord& record = std::as_const(bank_)[i];
+        return record.enabled && record.acting && record.side == Side::plateau &&
+               record.awaited == Side::plateau;
+    }
+    /// Whether there is such a guard, which the reset of another one may set in motion.
+    [[nodiscard]] bool any_stands() const noexcept
+    {
+        if (single || !bank_.any_stands()) return false;
+        for (std::size_t i = 0; i < bank_.size(); ++i) {
+            if (stands(i)) return true;
+        }
+        return false;
+    }
     /// Notes that the current set leaves the flow at the start of the step, `taken` [s] after
     /// that of `left_start_`, if it is known.
     void leave_from_start(double taken)

@@ -124,7 +124,7 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
             tied ? search_.meet_conditions_on_time(step_, bank_, calls())
                  : on_time_ || on_change_ || search_.meet_conditions(step_, bank_, calls());
         run_.statistics.unmet_conditions += !met;
-        left_known_ = system_->moded;
+        left_known_ = system_->moded || any_stands();
         if (left_known_) {
             assign(left_rate_, search_.before());
             step_.flow(search_.at(), search_.before(), left_rate_);

@@ -84,8 +84,11 @@ bool EventEngine<X, single>::falls(std::size_t i, bool soon)
     } else {
         excursions.keep_rounding();
     }
-    const bool falls = excursions.fall(size_of_excursion(i, record.noted.slope, interval));
-    excursions.end(step_.start().value, record.noted.slope);
+    const double size = size_of_excursion(i, record.noted.slope, interval);
+    const bool falls = excursions.fall(size);
+    const double t = step_.start().value;
+    excursions.loss().see(t, interval, size, record.noted.rounding);
+    excursions.end(t, record.noted.slope);
     return falls;
 }
 
@@ -101,10 +104,11 @@ void EventEngine<X, single>::note_excursions()
         GuardRecord& record = bank_[i];
         double& slope = record.noted.slope = search_.where(i).slope;
         const double size = size_of_excursion(i, slope, interval);
-        double rounding = record.excursions.rounding();
-        if (record.excursions.wants_rounding(size)) {
-            rounding = record.noted.rounding = rounding_of(i, step_.mode(), at.value, x);
-        }
+        Excursions& excursions = record.excursions;
+        const bool wants = excursions.wants_rounding(size);
+        const bool known = wants || single;  // whose rounding may depend on the mode
+        record.noted.rounding = known ? rounding_of(i, step_.mode(), at.value, x) : stale;
+        const double rounding = wants ? record.noted.rounding : excursions.rounding();
         // A difference over a part of a step says nothing about a slow guard.
         if (size > tolerances::of_drift * rounding || system_->rated || !system_->flow) continue;
         X rate = x;

@@ -334,7 +334,7 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
     }
     if (record.info.boolean || record.info.crossing == Crossing::either) return false;
     const bool is_member = record.fired && resets_any_ && record.info.resets;
-    if (!changed_mode_ && !is_member && !(on_time_ && changes_on_time())) return false;
+    if (!changed_mode_ && !is_member && !is_set_in_motion(i)) return false;
     const X& left = search_.before();
     if (left.size() != step_.x0().size()) return false;
     const double t = step_.time(0);
@@ -355,8 +355,8 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
         X rate = left_rate_;
         X later = step_.x0();
         if (changed_mode_ || !is_member) {
-            // The flow of a mode that has been left is not called any more; nor is one that a time
-            // event may have changed.
+            // The flow of a mode that has been left is not called any more; nor is one that the set
+            // may have changed.
             const double part = left_after_ > 0 ? ahead / left_after_ : 0;
             for_each_component(rate,
                                [&](auto c) { rate[c] += part * (left_rate_[c] - left_start_[c]); });
@@ -371,10 +371,16 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
 }
 
 template <class X, bool single>
-bool EventEngine<X, single>::changes_on_time()
+bool EventEngine<X, single>::is_set_in_motion(std::size_t i)
 {
-    return left_known_ &&
-           !(same_state(search_.before(), step_.x0()) && same_state(left_rate_, step_.rate0()));
+    if (!left_known_) return false;
+    if (!on_time_) {
+        // A reset that lets a crossing of this instant go on adds no event to it.
+        const double t = step_.time(0);
+        const double ago = std::fabs(t - std::as_const(bank_)[i].last);
+        if (!stands(i) || ago <= resolution_.blur(t)) return false;
+    }
+    return !(same_state(search_.before(), step_.x0()) && same_state(left_rate_, step_.rate0()));
 }
 
 template <class X, bool single>

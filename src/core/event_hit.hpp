@@ -60,7 +60,7 @@ struct Note {
 };
 
 /// Halves a bracket by the sides of the guard alone, down to the tolerance or neighbouring doubles.
-[[nodiscard]] Location bisect(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance);
+void bisect(GuardPath& path, GuardSample& lo, GuardSample& hi, double tolerance);
 
 /// The places inside a step, as fractions, at which guards are evaluated of which only the sign has
 /// a meaning: where numbers are, and at all of those places in a step so long that few of its

@@ -13,7 +13,7 @@ void sort_notes_until(double s, std::vector<Note>& notes)
     });
 }
 
-Location bisect(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance)
+void bisect(GuardPath& path, GuardSample& lo, GuardSample& hi, double tolerance)
 {
     while (hi.s - lo.s > std::max(tolerance, path.finest(hi.s))) {
         const double middle = lo.s + (hi.s - lo.s) / 2;
@@ -21,7 +21,6 @@ Location bisect(GuardPath& path, GuardSample lo, GuardSample hi, double toleranc
         const GuardSample sample = path.value(middle);
         (path.has_left(sample) ? hi : lo) = sample;
     }
-    return {.lo = lo.s, .hi = hi.s, .root = hi.s, .error = hi.s - lo.s};
 }
 
 }  // namespace ricochet::detail

@@ -176,6 +176,7 @@ public:
         fired_.clear();
         evidence_ = finders_->detector.evidence;
         late_ = rated_at_set_ = values_known_ = straight_in_space_ = has_lost_ = false;
+        change_.known = false;
         std::size_t suspects = 0;
         std::size_t last = 0;
         for (const std::size_t i : bank.suspects()) {
@@ -419,7 +420,7 @@ private:
     [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Bank& bank, std::size_t i)
     {
         if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
-        if (bank[i].info.boolean) return heed(bank, i, watch, next_change(probe, watch, bank));
+        if (bank[i].info.boolean) return heed(bank, i, watch, next_change(probe, watch, bank, i));
         if (bank.has_series(i)) return heed(bank, i, watch, next_on_series(probe, watch, bank, i));
         if (cover_.covers(bank[i]))
             return heed(bank, i, watch, next_under_bound(probe, watch, bank));
@@ -434,7 +435,8 @@ private:
 
     /// The next event of a guard of which only the sign has a meaning, from its values at the
     /// places inside the step at which it is evaluated.
-    [[nodiscard]] Finding next_change(Probe& probe, Watch& watch, const Bank& bank) const
+    [[nodiscard, gnu::noinline]] Finding next_change(Probe& probe, Watch& watch, const Bank& bank,
+                                                     std::size_t i) const
     {
         const GuardSample start = watch.start, end = watch.end;
         const double h = probe.step().h();
@@ -444,16 +446,20 @@ private:
         Side side = watch.side;
         const auto add = [&](const GuardSample& sample) {
             samples[count++] = sample;
-            if (!has_left(side, sample.value)) return;
+            if (!has_left(side, sample.value)) return false;
             side = opposite(side);
             ++changes;
+            return counts(opposite(side), probe.crossing());
         };
+        // The bits of an event do not depend on where else the guard has been evaluated.
+        const bool whole = resolution_.is_finest();
         for (const double u : signs_.places(h, bank.checked_everywhere())) {
-            if (u * h > start.s && u * h < end.s) add(probe.dense_value(u * h));
+            if (!(u * h > start.s && u * h < end.s)) continue;
+            const GuardSample known = bank.known_at(u, i, h);
+            if (add(known.s > 0 ? known : probe.dense_value(u * h)) && !whole) break;
         }
         add(end);
-        // The bits of an event do not depend on where else the guard has been evaluated.
-        if (changes == 1 && resolution_.is_finest()) return Ends::compare_signs(probe, watch);
+        if (changes == 1 && whole) return Ends::compare_signs(probe, watch);
         for (std::size_t k = 0;; ++k) {
             watch.end = samples[k];
             const Finding finding = Ends::compare_signs(probe, watch);
@@ -651,17 +657,40 @@ private:
         if (finding.late) {
             return Location{.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
         }
+        const double tolerance = std::max(resolution_.tolerance(probe.step().time(finding.hi.s)),
+                                          bank.unresolved(i, probe.step().h()));
+        if (bank[i].info.boolean) return find_change(probe, finding, bank, i, tolerance);
         if (!probe.agree_on(finding.lo, finding.hi, bank.start(i), bank[i].side)) {
             return std::nullopt;
         }
-        const double tolerance = std::max(resolution_.tolerance(probe.step().time(finding.hi.s)),
-                                          bank.unresolved(i, probe.step().h()));
-        if (!bank[i].info.boolean) {
-            const double departure = bank.departure(i, probe.step().h());
-            if (bank.is_cubic(i, departure)) probe.take_as_cubic();
-            return finders_->locate(probe, finding.lo, finding.hi, tolerance);
+        const double departure = bank.departure(i, probe.step().h());
+        if (bank.is_cubic(i, departure)) probe.take_as_cubic();
+        return finders_->locate(probe, finding.lo, finding.hi, tolerance);
+    }
+
+    /// The same for a guard of which only the sign has a meaning. Of the ends of the bracket only
+    /// those that the bisection leaves have to agree with the step's own map.
+    [[nodiscard, gnu::noinline]] std::optional<Location> find_change(Probe& probe, Finding finding,
+                                                                     const Bank& bank,
+                                                                     std::size_t i,
+                                                                     double tolerance)
+    {
+        const GuardSample start = bank.start(i);
+        GuardSample lo = finding.lo, hi = finding.hi;
+        bisect(probe, lo, hi, tolerance);
+        const bool lo_agrees =
+            lo.s != finding.lo.s || lo.s == start.s || !probe.has_left(probe.value(lo.s));
+        const bool hi_agrees =
+            hi.s != finding.hi.s || hi.s == probe.h() || probe.has_left(probe.value(hi.s));
+        if (!lo_agrees || !hi_agrees) {
+            if (!probe.agree_on(finding.lo, finding.hi, start, bank[i].side)) return std::nullopt;
+            lo = finding.lo;
+            hi = finding.hi;
+            bisect(probe, lo, hi, tolerance);
         }
-        return bisect(probe, finding.lo, finding.hi, tolerance);
+        const bool seen = hi.s != finding.hi.s || hi.s == probe.h();
+        change_ = {.guard = i, .known = seen, .at = hi};
+        return Location{.lo = lo.s, .hi = hi.s, .root = hi.s, .error = hi.s - lo.s};
     }
 
     /// Continues behind a departure that the step's own map does not have, on the map's side.
@@ -916,6 +945,16 @@ private:
     [[nodiscard]] double lacks(const CurrentStep& step, Bank& bank, const X& x, const TwoSum& at,
                                std::uint64_t& calls);
 
+    /// Whether the only guard of the set is one whose bisection has ended at the set, so that its
+    /// value there is `change_.at`.
+    [[nodiscard]] bool is_at_change(const CurrentStep& step, const Hit& hit, const TwoSum& at,
+                                    double t) const noexcept
+    {
+        return change_.known && change_.guard == hit.guard && fired_.size() == 1 &&
+               at.remainder == 0 && at.value == change_.at.s && hit.where.root == at.value &&
+               step.time(at.value) == t && (at.value != step.h() || same_state(before_, step.x1()));
+    }
+
     /// The set happens at its latest root, or at the time event that it belongs to.
     void settle_place(const CurrentStep& step, bool time_event_due);
 
@@ -959,6 +998,11 @@ private:
     double at_ = 0;
     double at_remainder_ = 0;
     std::optional<Creep> creep_;  ///< of the acting guards
+    struct {
+        std::size_t guard = 0;
+        bool known = false;  ///< `at` has been evaluated on the step's own map, or at its end
+        GuardSample at;
+    } change_;  ///< that `find_change` has located last
 };
 
 }  // namespace ricochet::detail

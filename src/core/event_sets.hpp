@@ -139,7 +139,8 @@ inline double EventSearch<X, single>::lacks(const CurrentStep& step, Bank& bank,
     for (const std::size_t i : fired_) {
         for (Hit& hit : hits_) {
             if (hit.guard != i || hit.where.jump) continue;
-            hit.value = bank.view(i, step.mode(), calls).value(t, x);
+            const bool known = &x == &before_ && is_at_change(step, hit, at, t);
+            hit.value = known ? change_.at.value : bank.view(i, step.mode(), calls).value(t, x);
             if (has_left(hit.side, hit.value)) continue;
             // A member that the window has put together with later ones may have turned back.
             if (!(at_ - hit.where.root <= resolution_.blur(t))) continue;

@@ -270,6 +270,7 @@ public:
         GuardRecord& record = (*this)[i];
         if (side == record.last_side && record.side == opposite(side)) record.returned = true;
         record.side = side;
+        if constexpr (!single) any_stands_ = any_stands_ || side == Side::plateau;
         sign_[i] = records_[i].enabled && !records_[i].deferred ? sign_of(side) : 0;
         as_screened_ = false;
     }
@@ -479,6 +480,7 @@ public:
         }
         if (keeps_rows_) row_.visit(visit);
         visit(waiting_);
+        if (!single) visit(any_stands_);
         visit(armed_at_);
         heed_enabled();
     }
@@ -489,7 +491,10 @@ public:
         records_[i].awaited = side;
         waiting_ = true;
     }
-    void await_none() noexcept { waiting_ = false; }
+    /// Before all guards that may be on a plateau are armed again.
+    void await_none() noexcept { waiting_ = any_stands_ = false; }
+    /// Whether any guard has been armed on a plateau since then.
+    [[nodiscard]] bool any_stands() const noexcept { return any_stands_; }
     [[nodiscard]] bool waiting() const noexcept { return waiting_; }
 
 private:
@@ -580,6 +585,7 @@ private:
     Doubles armed_g_{};
     LostRow row_;
     bool keeps_rows_;
+    bool any_stands_ = false;
 };
 
 }  // namespace ricochet::detail

@@ -13,7 +13,7 @@ void Loop<X, single>::emit_more_samples(double s, double end)
         return k < times.size() && lies_before(times[k], end);
     };
     if (!holds(next_sample_)) return;
-    const std::size_t most_alone = step_.most_sampled_alone();
+    const std::size_t most_alone = step_.most_sampled_alone(options_.record_steps);
     const bool on_polynomial =
         most_alone < times.size() - next_sample_ && holds(next_sample_ + most_alone);
     while (holds(next_sample_)) {

@@ -13,6 +13,68 @@
 
 namespace ricochet::detail {
 
+/// What rounding takes from the time to a limit. Where rounding moves a guard by d, each event
+/// takes the part d / size of the energy of its excursion. These parts grow as excursions decay,
+/// and the motion ends where their sum is 1: after an event of that part, and a motion that loses
+/// the part `decay` of its energy in each round, the root of part / decay of the remaining time is
+/// lost at the end, and about as much by shorter flights before. Half a unit in the last place is a
+/// 16th of the `rounding` of the engine, of 8 such units, so that of the remaining time
+///
+///     2 sqrt(rounding / (16 size decay))
+///
+/// is lost. All excursions to one surface at one acceleration give the same; of several, the one
+/// with the largest loss counts.
+class LossByRounding {
+public:
+    /// Records the excursion of that size that ended at t [s] after an interval [s]. Of a guard
+    /// that has several surfaces, one in each mode, each has its own rounding.
+    void see(double t, double interval, double size, double rounding) noexcept
+    {
+        if (!(size > 0)) return;
+        // Where the rate does not fall as excursions do, as of levels, no energy is lost; where
+        // they grow, another motion has begun.
+        const double rate = size / interval;
+        const double steepness = rate * rate * (rate * rate) / size;
+        if (!(steepness < steepest_)) {
+            if (size < size_) return;
+            steepest_ = steepness;
+            weight_ = part_ = 0;
+            return;
+        }
+        const double weight = rounding * rate / interval;
+        if (!(2 * weight >= weight_)) return;
+        const double decay = size < size_ ? 1 - size / size_ : 1;
+        size_ = size;
+        const double part = std::sqrt(rounding / (4 * size * decay));
+        if (!(part <= 0.25)) return;  // rounding already decides
+        t_ = t;
+        weight_ = weight;
+        part_ = part;
+    }
+    /// Time [s] that is lost of a motion that was seen to end at t [s].
+    [[nodiscard]] double time(double t) const noexcept
+    {
+        return part_ / (1 - part_) * std::fabs(t - t_);
+    }
+
+    template <class Visit>
+    void visit(Visit&& visit)
+    {
+        visit(t_);
+        visit(size_);
+        visit(weight_);
+        visit(part_);
+        visit(steepest_);
+    }
+
+private:
+    double t_ = 0;       ///< [s] end of the excursion
+    double size_ = 0;    ///< of it, or of the last one
+    double weight_ = 0;  ///< rounding times acceleration, of which the loss is the root
+    double part_ = 0;    ///< of the remaining time that is lost
+    double steepest_ = 0;
+};
+
 /// Excursions of one guard from its surface, from one acting instant to its event at the next.
 class Excursions {
 public:
@@ -68,6 +130,8 @@ public:
     /// How many in a row have been lost.
     [[nodiscard]] std::uint32_t lost() const noexcept { return lost_; }
 
+    [[nodiscard]] LossByRounding& loss() noexcept { return loss_; }
+
     /// Records that the last one ended at t [s], and the rate [1/s] of the guard there.
     void end(double t, double slope) noexcept
     {
@@ -78,15 +142,16 @@ public:
     /// [s]
     [[nodiscard]] double end() const noexcept { return end_; }
     /// Uncertainty [s] of the limit at time t: while excursions are lost, the time since they are,
-    /// and what was left then; else what the rounding of one event adds to all later ones. Speeds,
-    /// and with them intervals, fall by the root of what excursions do.
+    /// and what was left then; else what the rounding of one event adds to all later ones; at least
+    /// the loss by all. Speeds, and with them intervals, fall by the root of what excursions do.
     [[nodiscard]] double error(double t) const noexcept
     {
         const double q = std::sqrt(std::clamp(1 - usual_decay_, 0.0, 0.98));
         const double sum = (1 + q) / (1 - q);
-        if (lost_ > 0) return 2 * std::fabs(t - lost_from_) * sum;
-        const double late = std::fabs(rounding_ / (4 * slope_));
-        return std::isfinite(late) ? late * sum / (1 - q) : 0;  // of a rate that is not known
+        const double least = loss_.time(t);
+        if (lost_ > 0) return std::max(2 * std::fabs(t - lost_from_) * sum, least);
+        const double late = std::fabs(rounding_ / (4 * slope_)) * sum / (1 - q);
+        return std::isfinite(late) ? std::max(late, least) : least;  // of a rate that is not known
     }
 
     /// How often the guard occurs in a row, this time included.
@@ -110,6 +175,7 @@ public:
         visit(end_);
         visit(row_);
         visit(times_);
+        loss_.visit(visit);
     }
 
 private:
@@ -125,6 +191,7 @@ private:
     double lost_from_ = 0;                                   ///< [s] time since when they are lost
     double end_ = -std::numeric_limits<double>::infinity();  ///< [s] of the last one
     std::uint32_t row_ = 0, times_ = 0;
+    LossByRounding loss_;
 };
 
 /// Row of acting instants, one after the other, at each of which the excursion of the guard was

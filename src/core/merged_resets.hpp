@@ -157,7 +157,7 @@ private:
     {
         try {
             return reset();
-        } catch (const Stop& stop) {
+        } catch (const StopRun& stop) {
             if (!stops_ && !asks_again_) {
                 stops_ = true;
                 stopper_ = who;

@@ -90,6 +90,15 @@ public:
         marked_ = false;
     }
 
+    /// Guard i at the part u of the step, if it has been evaluated there; else at 0.
+    [[nodiscard]] GuardSample known_at(double u, std::size_t i, double h) const noexcept
+    {
+        if (u == CubicCheck::inside && checked()) return {.s = u * h, .value = inside_[i]};
+        const bool all = checked_ == Checked::further && are_few();
+        if (u == CubicCheck::further && all) return {.s = u * h, .value = further_[i]};
+        return {};
+    }
+
     /// Evaluates them a second time, at the part `CubicCheck::further` of the step where the state
     /// is `x`.
     void sample_further(const Step<X>& step, const X& x, std::uint64_t& calls)

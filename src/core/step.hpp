@@ -276,12 +276,14 @@ public:
     /// The most samples of the step that are computed by steps of their own. More are taken from
     /// its polynomial, whose inner nodes cost a step each. A cubic has none, but also a larger
     /// error than a step: few samples are worth the calls. Where the polynomial is not of the
-    /// method's order, or may be rough, every sample is a step.
-    [[nodiscard]] std::size_t most_sampled_alone() const noexcept
+    /// method's order, or may be rough, every sample is a step. @param recorded  the inner nodes
+    /// are computed in any case
+    [[nodiscard]] std::size_t most_sampled_alone(bool recorded) const noexcept
     {
         if (kernel_->order > 8 || may_be_rough()) return std::numeric_limits<std::size_t>::max();
         const DenseNodes nodes = dense_nodes();
-        return nodes == DenseNodes::end ? 2 : inner_nodes(nodes);
+        if (nodes == DenseNodes::end) return 2;
+        return recorded ? 0 : inner_nodes(nodes);
     }
 
     struct Sampling {

@@ -120,7 +120,7 @@ void throw_endless(double t_end)
     throw std::invalid_argument(fmt::format(
         "integrate: t_end must be a finite time where nothing else may end the run, got {}; "
         "expected a guard with stop_after, stop_at_event, or max_steps, also beside a reset that "
-        "ends the run by Stop",
+        "ends the run",
         t_end));
 }
 

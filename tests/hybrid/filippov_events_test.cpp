@@ -340,7 +340,7 @@ struct Taken : Doses {
     void reset(const FiredGuards& fired, double, X2& x) const
     {
         x[1] = static_cast<double>(fired.size());
-        if (conflict) throw Stop("enough");
+        if (conflict) throw StopRun("enough");
     }
 };
 

@@ -52,6 +52,7 @@ EVERYDAY(Node)
 EVERYDAY(Edge)
 EVERYDAY(Network)
 EVERYDAY(Bounded)
+EVERYDAY(Stop)
 
 #undef EVERYDAY
 
@@ -68,4 +69,18 @@ TEST(Names, EverydayNamesAreTheUsers)
     const auto run = integrate(ball, {1, 0}, {.t_end = 0.6});
     EXPECT_EQ(run.events.size(), 1u);
     EXPECT_EQ(value_of(Step{}) + value_of(Box{}) + value_of(Gate{}) + value_of(Stage{}), 4);
+}
+
+TEST(Names, AResetEndsTheRunBesideAStopOfTheUser)
+{
+    struct Line {
+        using State = std::array<double, 1>;
+        Stop stop{.value = 3};
+        static void flow(double, const State&, State& dxdt) { dxdt = {1}; }
+        [[nodiscard]] double guard(double, const State& x) const { return stop.value - x[0]; }
+        void reset(double, State&) const { throw StopRun("at the stop"); }
+    };
+    const auto run = integrate(Line{}, {0}, {.t_end = 5});
+    EXPECT_DOUBLE_EQ(run.t, value_of(Line{}.stop));
+    EXPECT_EQ(run.reason, "at the stop");
 }

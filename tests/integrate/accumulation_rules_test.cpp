@@ -100,6 +100,46 @@ TEST(ShrinkingIntervals, ExcursionsLostInRoundingFade)
     EXPECT_LE(n, 26);
 }
 
+// --- what rounding takes ---
+
+/// Time that flights under a weight of 2 lose where each event takes `taken` of the energy, as a
+/// part of the loss that is expected from their roundings.
+double part_of_expected_loss(double restitution, double taken)
+{
+    LossByRounding loss;
+    double t = 0, speed = 1;
+    for (;;) {
+        // A flight of length v rises by v^2 / 4; with rounding its energy v^2 falls by 4 taken.
+        const double interval = speed;
+        t += interval;
+        loss.see(t, interval, speed * interval / 4, 16 * taken);
+        const double energy = speed * speed - 4 * taken;
+        if (!(energy > 0)) break;
+        speed = restitution * std::sqrt(energy);
+    }
+    const double limit = 1 / (1 - restitution);
+    return (limit - t) / loss.time(t);
+}
+
+TEST(LossByRounding, BoundsTheTimeThatFlightsLose)
+{
+    for (double restitution = 0.3; restitution < 0.96; restitution += 0.05) {
+        for (double taken = 1e-16; taken < 1e-12; taken *= 1.3) {
+            const double part = part_of_expected_loss(restitution, taken);
+            EXPECT_GT(part, 0.2) << restitution << ' ' << taken;
+            EXPECT_LT(part, 1) << restitution << ' ' << taken;
+        }
+    }
+}
+
+TEST(LossByRounding, TakesNothingFromALevelWhoseRateDoesNotFall)
+{
+    LossByRounding loss;
+    double t = 0, size = 1;
+    for (; size > 1e-17; size /= 2) loss.see(t += size, size, size, 1e-16);
+    EXPECT_EQ(loss.time(t + 1), 0);
+}
+
 // --- cycles of several guards ---
 
 /// Events of two guards in turn, whose excursions shrink by `decay` from one round to the next and

@@ -649,6 +649,121 @@ TEST(Meaning, AHostsTickThatMovesAStandingGuardOutwardHasItsEvent)
     EXPECT_EQ(host.x[0], 0);
 }
 
+/// A cart x' = v + pull that stands at the guard x, whose reset stops it, and a clock y' = 1 that
+/// sets it in motion once a second, by its velocity or by the pull; no modes.
+struct PushedCart {
+    using State = Array<3>;  // x, v, y
+    std::size_t guard_count = 2;
+    double* pull;
+    bool by_state = true;
+    double push = -1;
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[1] + *pull, 0, 1}; }
+    [[nodiscard]] static double guard(std::size_t i, double, const State& x)
+    {
+        return i == 0 ? x[0] : 1 - x[2];
+    }
+    void reset(std::size_t i, double, State& x) const
+    {
+        if (i == 0) {
+            x[1] = *pull = 0;
+        } else {
+            (by_state ? x[1] : *pull) = push;
+            x[2] = 0;
+        }
+    }
+};
+
+TEST(Meaning, AnotherGuardThatMovesAStandingOneOutwardGivesItItsEvent)
+{
+    for (const bool by_state : {true, false}) {
+        double pull = 0;
+        const PushedCart cart{.pull = &pull, .by_state = by_state};
+        by_all(cart, Array<3>{0, 0, 0}, {.t_end = 3.5},
+               [&](const auto& run, const std::string& label) {
+                   ASSERT_EQ(run.events.size(), 6U) << label << by_state;
+                   for (std::size_t k = 0; k < 6; ++k) {
+                       EXPECT_EQ(run.events[k].guard, 1 - k % 2) << label;
+                       EXPECT_NEAR(run.events[k].t, 1 + static_cast<double>(k / 2), 1e-13) << label;
+                   }
+                   EXPECT_EQ(run.x[0], 0) << label << by_state;
+                   pull = 0;
+               });
+    }
+}
+
+TEST(Meaning, AnotherGuardThatLiftsAStandingOneOrLeavesItAloneGivesItNoEvent)
+{
+    double pull = 0;
+    for (const double push : {0.0, 0.25}) {
+        const PushedCart cart{.pull = &pull, .push = push};
+        by_all(cart, Array<3>{0, 0, 0}, {.t_end = 2.5},
+               [&](const auto& run, const std::string& label) {
+                   EXPECT_EQ(run.events.size(), 2U) << label << push;
+                   EXPECT_NEAR(run.x[0], 1.5 * push, 1e-13) << label;
+               });
+    }
+}
+
+TEST(Meaning, AHostsGuardThatAnotherOneMovesOutwardHasItsEvent)
+{
+    double pull = 0;
+    const PushedCart cart{.pull = &pull};
+    EventMonitor monitor(cart, Array<3>{});
+    const auto host = test::drive(cart, monitor, Array<3>{0, 0, 0}, 3.5, 0.1);
+    EXPECT_EQ(host.events.size(), 6U);
+    EXPECT_EQ(host.x[0], 0);
+}
+
+TEST(Meaning, BallsThatTouchPassAStrokeOnAtOneInstant)
+{
+    // Three equal balls in a row, the second and the third in contact at exactly zero. Each contact
+    // exchanges velocities: after the stroke at 1 only the third moves.
+    struct Cradle {
+        using State = Array<6>;  // places of surfaces that face each other, then velocities
+        std::size_t guard_count = 2;
+        static void flow(double, const State& x, State& dxdt)
+        {
+            dxdt = {x[3], x[4], x[5], 0, 0, 0};
+        }
+        [[nodiscard]] static double guard(std::size_t i, double, const State& x)
+        {
+            return x[i + 1] - x[i];
+        }
+        static void reset(std::size_t i, double, State& x) { std::swap(x[i + 3], x[i + 4]); }
+    };
+    by_all(Cradle{}, Array<6>{-1, 0, 0, 1, 0, 0}, {.t_end = 3},
+           [](const auto& run, const std::string& label) {
+               ASSERT_EQ(run.events.size(), 2U) << label;
+               EXPECT_EQ(run.events[1].guard, 1U) << label;
+               EXPECT_EQ(run.events[1].t, run.events[0].t) << label;
+               EXPECT_NEAR(run.x[0], 0, 1e-13) << label;
+               EXPECT_NEAR(run.x[1], 0, 1e-13) << label;
+               EXPECT_NEAR(run.x[2], 2, 1e-13) << label;
+           });
+}
+
+TEST(Meaning, AResetThatLetsACrossingOfItsInstantGoOnAddsNoEventToIt)
+{
+    // The guard x stops the motion, and a guard of its velocity lets it go on at 0.3.
+    struct Passing {
+        using State = Array<2>;
+        std::size_t guard_count = 2;
+        static void flow(double, const State& x, State& dxdt) { dxdt = {x[1], 0}; }
+        [[nodiscard]] static double guard(std::size_t i, double, const State& x)
+        {
+            return i == 0 ? x[0] : -x[1] - 0.25;
+        }
+        static void reset(std::size_t i, double, State& x) { x[1] = i == 0 ? 0 : -0.3; }
+    };
+    by_all(Passing{}, Array<2>{0.5, -0.5}, {.t_end = 2},
+           [](const auto& run, const std::string& label) {
+               ASSERT_EQ(run.events.size(), 2U) << label;
+               EXPECT_EQ(run.events[0].guard, 0U) << label;
+               EXPECT_EQ(run.events[1].guard, 1U) << label;
+               EXPECT_NEAR(run.x[0], -0.3, 1e-13) << label;
+           });
+}
+
 TEST(Meaning, ATriangleWaveAndAStaircaseOfModesHaveEveryEvent)
 {
     Machine<Array<1>> wave;
@@ -955,6 +1070,42 @@ TEST(Meaning, NoFunctionIsCalledInAModeThatHasBeenLeftByAnEventOfACycle)
         EXPECT_EQ(std::exchange(late, 0), 0) << label;
         now = 0;
     });
+}
+
+TEST(Meaning, EachEventCallsItsResetOnce)
+{
+    struct Waves {
+        using State = Array<1>;
+        int* calls;
+        static void flow(double, const State&, State& dxdt) { dxdt = {1}; }
+        [[nodiscard]] static double guard(double, const State& x) { return std::sin(x[0]); }
+        void reset(double, State&) const { ++*calls; }
+    };
+    int calls = 0;
+    // Steps of 1, so that the signs at their ends show every crossing, too.
+    by_all(Waves{&calls}, Array<1>{0.5}, {.t_end = 100, .h_max = 1},
+           [&](const auto& run, const std::string& label) {
+               EXPECT_EQ(run.events.size(), 16U) << label;
+               EXPECT_EQ(std::exchange(calls, 0), 16) << label;
+           });
+}
+
+TEST(Meaning, ACreepingStateSatisfiesItsConditionAtItsEvent)
+{
+    // 4 units in the last place of 1 at a rate of 1e-15: the event lies within the rounding of x
+    // over its rate of 0.888.
+    struct Creeping {
+        using State = Array<1>;
+        static void flow(double, const State&, State& dxdt) { dxdt = {-1e-15}; }
+        [[nodiscard]] static double guard(double, const State& x) { return x[0] - 1; }
+        static void reset(double, State&) {}
+    };
+    by_all(Creeping{}, Array<1>{1 + 0x1p-50}, {.t_end = 4},
+           [](const auto& run, const std::string& label) {
+               ASSERT_EQ(run.events.size(), 1U) << label;
+               EXPECT_NEAR(run.events[0].t, 0.888, 0.2) << label;
+               EXPECT_LE(run.events[0].before[0], 1) << label;
+           });
 }
 
 // --- runs that follow each other ---

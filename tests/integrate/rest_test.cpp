@@ -160,6 +160,18 @@ TEST(Limits, OfCyclesWhoseCoarsestGuardHidesItsFlights)
     }
 }
 
+TEST(Limits, OfCyclesThatLoseTheirLastFlightsToTheRoundingOfTheirPlaces)
+{
+    // The last flights are cut short by rounding, or lost; the first five have one guard for all
+    // places, of which each has its own rounding.
+    for (const std::uint64_t seed :
+         {9864, 14593, 34398, 54630, 62544, 17415, 25704, 59154, 91497}) {
+        const CycleCase cycle = RandomCycles(seed).any();
+        EXPECT_EQ(test::fault_of(cycle, ErrorControlled<Fehlberg78>{}), "") << seed;
+        EXPECT_EQ(test::fault_of(cycle, ErrorControlled<Dopri5>{}), "") << seed;
+    }
+}
+
 TEST(Limits, AreNotSeenInClocksThatStrikeAlmostTogether)
 {
     EXPECT_TRUE(test::clocks_run({0, 11, 17, 20, 21, 22}));

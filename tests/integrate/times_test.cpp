@@ -534,7 +534,7 @@ TEST(Endless, WhereNothingEndsTheRunItIsRefused)
     EXPECT_EQ(refusal([] { (void)integrate(Decay{}, {1}, {.t_end = infinity}); }),
               "integrate: t_end must be a finite time where nothing else may end the run, got inf; "
               "expected a guard with stop_after, stop_at_event, or max_steps, also beside a reset "
-              "that ends the run by Stop");
+              "that ends the run");
     // Whether a reset will end it cannot be seen beforehand.
     EXPECT_THROW((void)integrate(Limit{}, {1}, {.t_end = infinity}), std::invalid_argument);
     EXPECT_THROW((void)integrate(Doses{}, {1}, {.t_end = std::nan("")}), std::invalid_argument);
@@ -547,7 +547,7 @@ TEST(Endless, AClockIsNoEndButItsResetMayBe)
     struct Ten : Doses {
         void time_reset(double, State& x) const
         {
-            if (++x[0] == 10) throw Stop("ten ticks");
+            if (++x[0] == 10) throw StopRun("ten ticks");
         }
     };
     const auto run = integrate(Ten{{every(100)}}, {0}, {.t_end = infinity, .max_steps = 1'000'000});
@@ -561,7 +561,7 @@ TEST(Endless, AHundredHertzForADayDoesNotStall)
     struct Sampler : Doses {
         void time_reset(double, State& x) const
         {
-            if (++x[0] == 100'000) throw Stop("enough");
+            if (++x[0] == 100'000) throw StopRun("enough");
         }
     };
     const auto run = integrate(Sampler{{every(0.01)}}, {0},
@@ -591,7 +591,7 @@ struct Fragile {
         x[0] = 0;
         x[1] = -x[1];
         x[2] += 1;
-        if (x[2] == 3) throw Stop("it broke", Mode{1});
+        if (x[2] == 3) throw StopRun("it broke", Mode{1});
         return mode;
     }
 };
@@ -630,7 +630,7 @@ struct Pair {
     void reset(std::size_t which, double, State& x) const
     {
         x[0] += 1;
-        if (x[0] > most && which == 1) throw Stop("too much");
+        if (x[0] > most && which == 1) throw StopRun("too much");
     }
 };
 
@@ -652,7 +652,7 @@ TEST(Stops, InASetTheFirstCallCounts)
 TEST(Stops, AResetThatChangesNothingElseEndsTheRun)
 {
     struct Wall : Limit {
-        void reset(double, State&) const { throw Stop("at the wall"); }
+        void reset(double, State&) const { throw StopRun("at the wall"); }
     };
     const auto run = integrate(Wall{{-1}}, {1}, {.t_end = 2});
     EXPECT_EQ(run.outcome, Outcome::stopped_by_event);
@@ -663,7 +663,7 @@ TEST(Stops, AResetThatChangesNothingElseEndsTheRun)
 TEST(Stops, AResetEndsTheRunOfAMonitor)
 {
     struct Wall : Limit {
-        void reset(double, State&) const { throw Stop("at the wall"); }
+        void reset(double, State&) const { throw StopRun("at the wall"); }
     };
     const Wall wall{{-1}};
     EventMonitor monitor(wall, std::array<double, 1>{});

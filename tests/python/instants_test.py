@@ -190,3 +190,36 @@ def test_a_limited_run_goes_on_from_its_snapshot():
     assert np.array_equal(more.run_to_end().x, oscillation(10.0).run_to_end().x)
     with pytest.raises(ValueError, match="later than t_end"):
         oscillation(0.001).restore(snapshot)
+
+
+@pytest.mark.parametrize("period", [1.0, 0.3, 0.1, 1 / 3, 0.001])
+def test_a_sample_at_an_event_is_its_state_after_and_one_stop(period):
+    samples = [n * period for n in range(1, 101)]
+    system = ricochet.System(lambda t, x: [1.0],
+                             [ricochet.Guard(lambda t, x: period - x[0], reset=lambda t, x: [0.0])])
+    stops = list(ricochet.Simulation(system, [0.0], 100.5 * period, sample_times=samples))
+    assert [t for t, _ in stops] == samples
+    assert all(x[0] == 0 for _, x in stops)
+
+
+def test_a_reset_that_acts_in_one_direction_only_is_not_ineffective():
+    guard = ricochet.Guard(lambda t, x: math.sin(t), direction=0, directed=True,
+                           reset=lambda t, x, direction: [x[0] + 1] if direction > 0 else x)
+    run = ricochet.integrate(ricochet.System(lambda t, x: [0.0], [guard]), [0.0], 20.0, t_start=0.1, h_max=0.5)
+    assert run.x[0] == 3 and len(run.events) == 6
+    assert run.statistics.ineffective_resets == 0 and run.statistics.declined_guard is None
+
+
+NAN = math.nan
+
+
+@pytest.mark.parametrize("flow, value, reset, reason", [
+    (lambda t, x: [-1.0 if t < 0.5 else NAN], lambda t, x: x[0], lambda t, x: x, "the flow"),
+    (lambda t, x: [-1.0], lambda t, x: x[0] if t < 0.5 else NAN, lambda t, x: x, "guard 0"),
+    (lambda t, x: [-1.0], lambda t, x: x[0] - 0.5, lambda t, x: [NAN], "the reset of guard 0"),
+])
+def test_a_run_says_which_function_was_not_finite(flow, value, reset, reason):
+    system = ricochet.System(flow, [ricochet.Guard(value, reset=reset)])
+    run = ricochet.integrate(system, [1.0], 2.0, method="rk4", fixed=True, step=0.1)
+    assert run.outcome == "non_finite" and run.reason == reason
+    assert run.message.startswith(reason)

@@ -150,3 +150,82 @@ def test_a_dip_within_a_true_bound_is_found(options):
     assert len(run.events) == 1
     assert abs(run.events["t"][0] - 0.36998) < 1e-9
     assert run.statistics.unresolved_steps == 0
+
+
+# --- guards that stand at exactly zero ---
+
+def stop(pull):
+    """The guard x of a body that stands at 0, whose reset stops it."""
+    def reset(t, y):
+        pull[0] = 0.0
+        return [y[0], 0.0, *y[2:]]
+
+    return event(lambda t, y: y[0], reset)
+
+
+@pytest.mark.parametrize("by_state", [True, False])
+@pytest.mark.parametrize("detector", ["extremum", "ends"])
+@pytest.mark.parametrize("method", ["dopri5", "fehlberg78"])
+def test_a_tick_that_moves_a_standing_guard_outward_gives_it_its_event(method, detector, by_state):
+    pull = [0.0]
+
+    def kick(t, x):
+        if by_state:
+            return [x[0], -1.0]
+        pull[0] = -1.0
+        return x
+
+    floor = stop(pull)
+    system = ricochet.System(lambda t, x: [x[1] + pull[0], 0.0],
+                             [ricochet.Guard(floor, reset=floor.reset)], time_events=[1.0], time_reset=kick)
+    run = ricochet.integrate(system, [0.0, 0.0], 1.5, method=method, detector=detector)
+    assert run.events["guard"].tolist() == [-1, 0]
+    assert run.events["t"].tolist() == [1, 1] and run.x[0] == 0
+
+
+@pytest.mark.parametrize("by_state", [True, False])
+@pytest.mark.parametrize("method", ["RK45", "DOP853"])
+def test_another_event_that_moves_a_standing_guard_outward_gives_it_its_event(method, by_state):
+    pull = [0.0]
+
+    def push(t, y):
+        if not by_state:
+            pull[0] = -1.0
+        return [y[0], -1.0 if by_state else 0.0, 0.0]
+
+    result = solve(lambda t, y: [y[1] + pull[0], 0.0, 1.0], 3.5, [0.0, 0.0, 0.0],
+                   [stop(pull), event(lambda t, y: 1 - y[2], push)], method=method)
+    np.testing.assert_allclose(result.t_events[0], [1, 2, 3], atol=1e-13)
+    np.testing.assert_allclose(result.t_events[1], [1, 2, 3], atol=1e-13)
+    assert result.y[0, -1] == 0
+
+
+def test_a_touch_at_a_tick_is_no_crossing_for_the_signs_at_the_ends_of_steps():
+    system = ricochet.System(lambda t, x: [1.0],
+                             [ricochet.Guard(lambda t, x: (x[0] - 1) ** 2, reset=lambda t, x: [9.0])],
+                             time_events=[1.0])
+    for t_end in (1.0, 3.0):
+        for step in (0.25, 0.09):
+            run = ricochet.integrate(system, [0.0], t_end, method="rk4", fixed=True, step=step,
+                                     detector="ends")
+            assert run.events["guard"].tolist() == [-1]
+
+
+# --- guards of which only the sign has a meaning ---
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
+def test_the_event_tolerance_saves_calls_of_boolean_guards(tolerance):
+    # A hundredth of a step is seven halvings, of which the places inside are some; with one call
+    # after the reset, two in each step, and one at the start.
+    calls = [0]
+
+    def level(t, x):
+        calls[0] += 1
+        return x[0] < 1
+
+    system = ricochet.System(lambda t, x: [1.0], [ricochet.Guard(level, boolean=True, reset=lambda t, x: [0.0])])
+    run = ricochet.integrate(system, [0.0], 20.55, method="rk4", fixed=True, step=0.1,
+                             event_tolerance=tolerance)
+    assert len(run.events) == 20
+    assert calls[0] == run.statistics.guard_calls
+    assert calls[0] - 1 - 2 * run.statistics.steps <= 20 * (7 + 1 + math.log2(1e-3 / tolerance))

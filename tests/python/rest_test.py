@@ -116,6 +116,23 @@ def test_a_saddle_is_turned_round_between_its_guards():
     expect_limit(saddle, [0.1, 0.0], limit, 1e-9 * limit)
 
 
+def test_a_limit_lies_within_its_error_where_rounding_takes_the_last_flights():
+    # Hops from place to place, lower each time by e = (0.67, 0.90, 0.41) and at other weights; the
+    # rounding of the place at 1 takes 2.9e-8 s of their time.
+    places, e, g = (0.02904080340079248, 1.0, 0.0), (0.6714, 0.9034, 0.4051), (5.3168, 5.5902, 8.9261)
+    hops = ricochet.System(
+        lambda m, t, x: [x[1], -g[m] if m < 3 else 0.0],
+        [ricochet.Guard(lambda m, t, x, i=i: x[0] - places[i], in_modes=[i], rest=lambda m, t, x: 3,
+                        reset=lambda m, t, x, i=i: ((i + 1) % 3, [places[(i + 1) % 3], -e[i] * x[1]]))
+         for i in range(3)], modes=4)
+    limit, v, k = 0.0, 1.2, 0
+    while v > 1e-40:
+        limit, v, k = limit + 2 * v / g[k], v * e[k], (k + 1) % 3
+    run = ricochet.integrate(hops, [places[0], 1.2], 2 * limit, rtol=1e-12, atol=1e-14, max_steps=200_000)
+    end = run.events[run.events["kind"] == ricochet.Kind.ACCUMULATION][0]
+    assert abs(end["t"] - limit) <= end["error"] <= 1e-6
+
+
 def test_events_of_solve_ivp_accumulate_in_turn():
     # The same saddle. Without modes a rest holds nothing, so that the run ends at the limit.
     def turned(t, y):

@@ -173,3 +173,17 @@ def test_a_tolerance_of_a_component_is_taken_as_it_is():
 def test_a_start_without_length():
     result = ricochet.solve_ivp(lambda t, y: -y, (4, 4), [2.0, 3.0], dense_output=True)
     assert result.success and np.array_equal(result.sol(4), [2, 3])
+
+
+@pytest.mark.parametrize("count", [5, 50, 500, 5000])
+@pytest.mark.parametrize("method", ["RK45", "DOP853"])
+def test_samples_beside_a_dense_output_cost_no_further_calls(method, count):
+    def solve(**more):
+        return ricochet.solve_ivp(swing, (0, 20), [1.0, 0.0], method, rtol=1e-10, atol=1e-12,
+                                  dense_output=True, **more)
+
+    t_eval = np.linspace(0, 20, count)
+    dense, both = solve(), solve(t_eval=t_eval)
+    assert both.nfev <= 1.2 * dense.nfev
+    # Both follow the motion to the error of an accepted step, at most 1e-10 + 1e-12.
+    np.testing.assert_allclose(both.y, dense.sol(t_eval), rtol=0, atol=2.02e-10)

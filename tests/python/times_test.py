@@ -197,6 +197,15 @@ def test_a_run_without_an_end_is_ended_by_an_event():
     assert ricochet.integrate(decay(), [1.0], math.inf, max_steps=50).outcome == "step_limit"
 
 
+@pytest.mark.parametrize("rate", [0.0, 1.0])
+def test_a_run_without_an_end_that_nothing_ends_stalls(rate):
+    # A terminal guard that is never reached by a motion that stands still, or recedes.
+    system = System(lambda t, x: [rate], [Guard(lambda t, x: x[0], stop_after=1)])
+    run = ricochet.integrate(system, [1.0], math.inf)
+    assert run.outcome == "stalled"
+    assert run.message.startswith("stall_steps steps hardly advanced the time, or nothing")
+
+
 def falling(reset):
     return System(lambda t, x: [-1.0, 0.0], [Guard(lambda t, x: x[0], reset=reset)])
 

@@ -131,7 +131,7 @@ public:
                 const auto result = change(scratch_[2]);
                 copy_state(scratch_[2], x);
                 return result;
-            } catch (const Stop&) {  // it has changed the state before
+            } catch (const StopRun&) {  // it has changed the state before
                 copy_state(scratch_[2], x);
                 throw;
             }

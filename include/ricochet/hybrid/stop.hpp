@@ -15,17 +15,17 @@ namespace ricochet {
 ///     void reset(double t, State& x) const
 ///     {
 ///         x[0] = 0;
-///         if (++hits == 3) throw ricochet::Stop("three hits");
+///         if (++hits == 3) throw ricochet::StopRun("three hits");
 ///     }
 ///
 /// The run ends as `stopped_by_event`, with what the reset has written as its state, and with the
 /// text as `Run::reason`. Where the resets of a set are asked several times, the first time counts.
-class Stop : public std::exception {
+class StopRun : public std::exception {
 public:
     /// @param why  the text of `Run::reason`
-    explicit Stop(std::string why) : why_(std::move(why)) {}
+    explicit StopRun(std::string why) : why_(std::move(why)) {}
     /// @param mode  the mode after the event
-    Stop(std::string why, Mode mode) : why_(std::move(why)), mode_(mode) {}
+    StopRun(std::string why, Mode mode) : why_(std::move(why)), mode_(mode) {}
 
     [[nodiscard]] const char* what() const noexcept override { return why_.c_str(); }
     [[nodiscard]] const std::string& why() const noexcept { return why_; }

@@ -48,7 +48,7 @@
 //                               start and after every set of events
 //     time_reset(t, x)          or Mode time_reset(mode, t, x); optional
 //
-// A reset or time_reset may end the run: throw ricochet::Stop("why"), see hybrid/stop.hpp.
+// A reset or time_reset may end the run: throw ricochet::StopRun("why"), see hybrid/stop.hpp.
 //
 // Bounds on how fast its guards can change, which let a detector skip most evaluations:
 // speed_bound and others, see hybrid/bounds.hpp.

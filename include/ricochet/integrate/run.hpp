@@ -381,7 +381,7 @@ struct Run {
     /// guard of the cycle that accumulates.
     std::size_t guard = no_guard;
     std::size_t other_guard = no_guard;
-    /// Text of the `Stop` that ended the run; of `non_finite` the function that was not finite.
+    /// Text of the `StopRun` that ended the run; of `non_finite` the function that was not finite.
     std::string reason;
     std::vector<std::size_t> armed_beyond;  ///< guards that `Statistics::armed_beyond` counts
     std::vector<Event<State>> events;

@@ -162,7 +162,7 @@ struct MixedRun {
     Mode mode = 0;
     /// As in `Run`: the guard that ended the run, and the other one of two that conflict.
     std::size_t guard = no_guard, other_guard = no_guard;
-    std::string reason;  ///< text of the `Stop` that ended the run
+    std::string reason;  ///< text of the `StopRun` that ended the run
     std::vector<Event<X>> events;
     std::vector<Phase> phases;
     Trajectory<X> trajectory;  ///< at the sample times
@@ -450,7 +450,7 @@ private:
         bool stops = false;
         try {
             event.mode_after = detail::call_time_reset(system_, mode, t, event.after);
-        } catch (const Stop& stop) {
+        } catch (const StopRun& stop) {
             stops = true;
             event.mode_after = stop.mode().value_or(mode);
             run_.reason = stop.why();

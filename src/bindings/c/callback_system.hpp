@@ -25,7 +25,7 @@ namespace ricochet::c {
 inline constexpr int stop_code = -0x53544f50;
 
 /// The text of the call of rc_stop whose result a callback of this thread has returned.
-/// @throws Stop if there was one, with the mode after the event
+/// @throws StopRun if there was one, with the mode after the event
 void end_run_if_asked(int code, Mode mode);
 
 /// Checks the return value of a callback, and throws CallbackFailed unless it is 0.

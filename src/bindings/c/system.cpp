@@ -120,7 +120,7 @@ void end_run_if_asked(int code, Mode mode)
     if (code != stop_code || !reason_here) return;
     std::string reason = std::move(*reason_here);
     reason_here.reset();
-    throw Stop(std::move(reason), mode);
+    throw StopRun(std::move(reason), mode);
 }
 
 CallbackSystem::CallbackSystem(const rc_callbacks& given)

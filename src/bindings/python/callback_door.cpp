@@ -395,7 +395,7 @@ private:
     }
 
     /// The mode after a reset, whose state is taken into x.
-    /// @throws Stop if it has ended the run
+    /// @throws StopRun if it has ended the run
     [[nodiscard]] Mode take_result(PyObject* result, const char* what, const std::string& of,
                                    Mode mode, State& x)
     {
@@ -406,7 +406,7 @@ private:
         if (!text) throw PythonError();
         const Mode next =
             after.get() == Py_None ? mode : take_place(after.get(), what, of, mode, x);
-        throw Stop(text, next);
+        throw StopRun(text, next);
     }
 
     [[nodiscard]] Mode reset_set(const FiredGuards& fired, Mode mode, double t, State& x)
