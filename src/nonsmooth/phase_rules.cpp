@@ -159,13 +159,14 @@ bool PhaseRules::is_near_surface(double t, const double* x)
 {
     inclusion().observe(t, x, y_.data());
     for (std::size_t i = 0; i < count(); ++i) {
-        if (std::fabs(y_[i]) <= 1e3 * resolution(i, x)) return true;
+        if (!is_clear(i, y_[i], x)) return true;
     }
     return false;
 }
 
 std::size_t PhaseRules::unbounded(Mode at, double t, const double* x)
 {
+    if (!inclusion().has_branches()) return no_reaction;
     inclusion().bounds(t, x, lower_.data(), upper_.data());
     for (std::size_t i = 0; i < count(); ++i) {
         const Branch branch = BranchPhases::branch(i, at);
@@ -254,6 +255,7 @@ Kind PhaseRules::kind_for(Mode b, double t, const double* x, PhaseCause cause)
     const Mode several = branch_modes_;
     cause_ = cause;
     if (b < several) return explicit_in(b);
+    if (!inclusion().has_branches()) return go_by_steps(PhaseCause::no_modes, t, x);
     if (b == several) return go_by_steps(PhaseCause::several, t, x);
     if (b == several + 1) return go_by_steps(PhaseCause::no_flow, t, x);
     inclusion().note_faulty(t, x);
@@ -320,7 +322,9 @@ Kind PhaseRules::decide_own(const Set& set, double* x)
         const bool of_set = fired.which != no_guard && kind_of_guard(fired.which) == 4;
         if (of_set) return kind_for(branch_modes_ + 2, set.t, x, cause_);
         if (fired.asks != no_reaction) {
-            asks = asks || BranchPhases::branch(fired.asks, at) == Branch::inside;
+            asks = asks || (inclusion().has_branches()
+                                ? BranchPhases::branch(fired.asks, at) == Branch::inside
+                                : !is_clear(fired.asks, y_[fired.asks], x));
             continue;
         }
         const std::size_t i = fired.which != no_guard ? reaction_of(fired.which) : fired.reaction;
@@ -477,6 +481,7 @@ bool PhaseRules::is_flow(double t, const double* x, const double* rate)
 
 void PhaseRules::note_changes(const Set& set, Mode before, Kind next, const double* x)
 {
+    if (!inclusion().has_branches()) return;
     inclusion().bounds(set.t, x, lower_.data(), upper_.data());
     const Mode after = next == across() ? static_cast<Mode>(memory_.across) : branches_of(next);
     for (std::size_t i = 0; i < count(); ++i) {
@@ -619,7 +624,7 @@ PhaseRules::Verdict PhaseRules::review_own(const Step& step, const double* x)
         if (may_arrive(step, 4 * step.h_next)) return {};
         return change_to(own, step.t, PhaseCause::released, -1);
     }
-    if (!may_arrive(step, 2 * step.h_next)) return {};
+    if (!inclusion().has_branches() || !may_arrive(step, 2 * step.h_next)) return {};
     const Mode b = inclusion().signs(step.t, x);
     const bool plain = !inclusion().holds(b) && has_finite_bounds(b, step.t, x);
     if (!plain || !is_flow_of(b, step, x)) return {};

@@ -26,7 +26,7 @@ using Kind = Mode;
 struct PhaseOptions {
     double t_start = 0, t_end = 0;  ///< [s]
     double rtol = 0, atol = 0;
-    double step = 0;  ///< [s] length of implicit steps
+    double step = 0;  ///< [s] longest implicit steps; with fixed steps their length
 };
 
 /// The inclusion of a mode of the system.
@@ -220,10 +220,11 @@ private:
     {
         return options_.atol + options_.rtol * inclusion().size_of_row(i, x);
     }
-    /// Whether y_i is farther from zero than the error of a thousand steps.
+    /// Whether y_i is farther from zero than the error of a thousand steps, and the motion thus
+    /// that of a flow.
     [[nodiscard]] bool is_clear(std::size_t i, double y, const double* x) const
     {
-        return std::fabs(y) >= 1e3 * resolution(i, x);
+        return inclusion().decides_at_zero() && std::fabs(y) >= 1e3 * resolution(i, x);
     }
     /// Whether the y of all reactions at a bound are.
     [[nodiscard]] bool are_clear(Mode b, double t, const double* x);

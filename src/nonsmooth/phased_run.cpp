@@ -14,7 +14,8 @@ template <class C>
 class PhasedRunOf final : public PhasedRun<C> {
 public:
     PhasedRunOf(PhasedSetup<C>&& setup, const C& x0, const Options& options)
-        : setup_(setup.user), system_(std::move(setup), x0, phase_options(options))
+        : setup_(setup.user),
+          system_(std::move(setup), x0, phase_options(options, setup_.error_controlled))
     {
         setup_.system = &system_.table();
         setup_.door = &system_;
@@ -58,14 +59,14 @@ public:
     [[nodiscard]] const StageReport& failure() const noexcept override { return system_.failure(); }
 
 private:
-    [[nodiscard]] static PhaseOptions phase_options(const Options& options)
+    [[nodiscard]] static PhaseOptions phase_options(const Options& options, bool error_controlled)
     {
         const HandOverOptions of = completed(options_of_phases(options), false);
         return {.t_start = of.t_start,
                 .t_end = of.t_end,
                 .rtol = of.rtol,
                 .atol = of.atol,
-                .step = of.set_valued.step};
+                .step = error_controlled ? of.set_valued.step : options.step};
     }
 
     RunSetup<C> setup_;
