@@ -150,7 +150,7 @@ private:
 
     [[nodiscard]] std::size_t all_guards() const noexcept
     {
-        return guards_ + PhaseRules::guards_of_reaction * reactions_;
+        return guards_ + rules_.guards_of_reaction() * reactions_;
     }
     [[nodiscard]] GuardInfo info(std::size_t i) const
     {
@@ -265,7 +265,14 @@ private:
         const Kind kind = kind_of(mode);
         if (kind == PhaseRules::own) return {&own_kernel_, user_.door, own_.flow};
         if (rules_.is_implicit(kind)) return {&implicit_, this, table_.flow};
-        return {in(own_mode(mode)).holds(kind) ? &held_ : free_, this, table_.flow};
+        const bool holds = in(own_mode(mode)).holds(kind);
+        if (!rules_.is_explicit(kind)) return {free_, this, table_.flow};
+        explicit_ = {&*rules_.now().inclusion, rules_.branches_of(kind)};
+        return {holds ? &held_ : free_, this, [](void* door, Mode, double t, const C& x, C& dxdt) {
+                    const InBranches& here = at(door).explicit_;
+                    here.inclusion->flow(here.branches, t, x.data(), dxdt.data());
+                    return true;
+                }};
     }
     bool flow(Mode mode, double t, const C& x, C& dxdt)
     {
@@ -344,6 +351,8 @@ private:
         const double rounding =
             32 * std::numeric_limits<double>::epsilon() * std::fabs(step.start.value);
         const double least = std::max(1e-9 * rules_.options().step, rounding);
+        // The steps of an inclusion alone are as long as they are asked for.
+        if (rules_.options().alone) return worst == worst ? 0 : worst;
         return h <= least ? std::min(worst, 1.0) : worst;
     }
     void depart(StepState<C>& step, double s, C& w, C& rate)
@@ -368,6 +377,11 @@ private:
         return std::max(error, std::pow(0.9 / fraction, free_->error_order + 1));
     }
 
+    struct InBranches {
+        const BranchPhases* inclusion = nullptr;
+        Mode branches = 0;
+    };
+
     RunSetup<C> user_;
     const SystemTable<C>& own_;
     StepKernel<C> own_kernel_;
@@ -388,6 +402,7 @@ private:
     std::vector<std::size_t> own_fired_;
     std::vector<PhaseRules::Fired> fired_;
     std::vector<ReactionChange> changes_;
+    InBranches explicit_;  ///< of the steps, in an explicit phase
     const StepKernel<C>* free_ = nullptr;
     StepKernel<C> held_, implicit_;
     SystemTable<C> table_;

@@ -108,6 +108,9 @@ public:
     [[nodiscard]] virtual Mode start(double t, double* x) const = 0;
     /// See `AnyModes::arrive`.
     [[nodiscard]] virtual Mode arrive(Mode at, double t, double* x) const = 0;
+    /// See `AnyModes::mode_after`. @throws InclusionRefused also for a reaction outside its set
+    [[nodiscard]] virtual Mode resume(double t, double* x, const double* reaction,
+                                      double error) = 0;
     virtual void hold(Mode at, double t, double* x) const = 0;
     /// See `AnyModes::undetermined`; `no_reaction` where there is none.
     [[nodiscard]] virtual std::size_t undetermined(Mode at, double t, const double* x) const = 0;
@@ -133,6 +136,9 @@ public:
     [[nodiscard]] virtual bool stays_held(Mode b, double t, const double* x) const = 0;
     [[nodiscard]] virtual bool flows(Mode b) const noexcept = 0;
     virtual void flow(Mode b, double t, const double* x, double* dxdt) const = 0;
+    /// The reactions in branches b; at the end of the last implicit step.
+    virtual void reaction(Mode b, double t, const double* x, double* r) const = 0;
+    virtual void reaction_of_step(double* r) const = 0;
     /// y' of reaction i.
     [[nodiscard]] virtual double rate_of(std::size_t i, const double* dxdt) const = 0;
     /// The fraction of a step that would follow the held reactions; 1 if the step does, and

@@ -74,6 +74,20 @@ public:
         write(w, x, size());
         return b;
     }
+    [[nodiscard]] Mode resume(double t, double* x, const double* reaction, double error) override
+    {
+        State end = from_;
+        end.t = t;
+        end.w = vector(x);
+        end.reaction.setZero();
+        for (std::size_t i = 0; i < reactions(); ++i) end.reaction[index(i)] = reaction[i];
+        check_start(matrices(), end.t, end.w);
+        check_reaction(matrices(), end);
+        to_ = end;
+        const Mode b = modes_.mode_after(end, error);
+        write(end.w, x, size());
+        return b;
+    }
     void hold(Mode at, double t, double* x) const override
     {
         Vector w = vector(x);
@@ -140,7 +154,11 @@ public:
     {
         X rate;
         modes_.flow(b, t, array(x), rate);
-        std::copy_n(rate.data(), size(), dxdt);
+        Base::write_state(rate.data(), dxdt);
+    }
+    void reaction(Mode b, double t, const double* x, double* r) const override
+    {
+        write(modes_.reaction(b, t, vector(x)), r, reactions());
     }
     [[nodiscard]] double rate_of(std::size_t i, const double* dxdt) const override
     {
@@ -333,8 +351,8 @@ private:
 
     [[nodiscard]] X array(const double* x) const
     {
-        X out{};
-        std::copy_n(x, size(), out.data());
+        X out;
+        Base::read_state(x, out.data());
         return out;
     }
 

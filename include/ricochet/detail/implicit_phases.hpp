@@ -27,7 +27,7 @@ protected:
 
 public:
     ImplicitPhases(const AnyInclusion<N, M>& inclusion, const BranchPhasesOptions& options)
-        : options_(options), step_(inclusion, options.scheme)
+        : options_(options), step_(inclusion, options.scheme), own_size_(inclusion.size())
     {
         from_.w.setZero(matrices().size());
         from_.reaction.setZero(matrices().reactions());
@@ -145,6 +145,10 @@ public:
         return branch_modes();
     }
     [[nodiscard]] Mode arrive(Mode, double, double*) const override { return branch_modes(); }
+    [[nodiscard]] Mode resume(double, double*, const double*, double) override
+    {
+        return branch_modes();
+    }
     void hold(Mode, double, double*) const override {}
     [[nodiscard]] std::size_t undetermined(Mode, double, const double*) const override
     {
@@ -180,6 +184,8 @@ public:
     {
         std::fill_n(dxdt, size(), 0.0);
     }
+    void reaction(Mode, double, const double*, double* r) const override { reaction_of_step(r); }
+    void reaction_of_step(double* r) const override { write(to_.reaction, r, reactions()); }
     [[nodiscard]] double rate_of(std::size_t i, const double* dxdt) const override
     {
         double rate = 0;
@@ -274,9 +280,30 @@ protected:
     // Components behind those of the system are zero.
     [[nodiscard]] Vector vector(const double* x) const
     {
-        Vector w = Vector::Zero(matrices().size());
-        for (std::size_t i = 0; i < size(); ++i) w[index(i)] = x[i];
+        Vector w(matrices().size());
+        read_state(x, w.data());
         return w;
+    }
+    // Numbers are copied one by one, as functions of systems write them: see components.hpp.
+    void read_state(const double* x, double* w) const
+    {
+        if constexpr (N > 0) {
+            if (own_size_ == N) return copy<N>(x, w);
+            std::fill_n(w, N, 0.0);
+        }
+        std::copy_n(x, own_size_, w);
+    }
+    void write_state(const double* w, double* x) const
+    {
+        if constexpr (N > 0) {
+            if (own_size_ == N) return copy<N>(w, x);
+        }
+        std::copy_n(w, own_size_, x);
+    }
+    template <int count>
+    static void copy(const double* from, double* to)
+    {
+        for (int i = 0; i < count; ++i) to[i] = *static_cast<const volatile double*>(from + i);
     }
     template <class V>
     static void write(const V& v, double* x, std::size_t count)
@@ -374,6 +401,7 @@ protected:
 
     BranchPhasesOptions options_;
     AnyStep<N, M> step_;
+    Eigen::Index own_size_;
     State from_, to_, probe_;
     State from_is_to_;  ///< start of the last step
     Vector error_;      ///< of the last step

@@ -12,21 +12,18 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <iterator>
-#include <limits>
 #include <memory>
-#include <stdexcept>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
-#include "ricochet/detail/event_loop.hpp"
 #include "ricochet/detail/given_inclusion.hpp"
 #include "ricochet/detail/hand_over_run.hpp"
-#include "ricochet/detail/hand_over_watches.hpp"
+#include "ricochet/detail/inclusion_alone.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
-#include "ricochet/detail/padded_run.hpp"
 #include "ricochet/detail/phased_run.hpp"
-#include "ricochet/detail/refusals.hpp"
 #include "ricochet/detail/refused_calls.hpp"
 #include "ricochet/integrate/integrate.hpp"
 
@@ -37,9 +34,7 @@ namespace ricochet {
 template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
 class HandOver {
     static_assert(detail::check_inclusion<System>());
-    // Of the solvers.
-    static constexpr int N = detail::solver_components<state_size<System>, reaction_size<System>>;
-    static constexpr int M = detail::solver_reactions<state_size<System>, reaction_size<System>>;
+    using Run = detail::RunOfInclusion<System, Stepping>;
 
 public:
     using Vector = StateOf<System>;
@@ -49,43 +44,22 @@ public:
     /// @throws std::invalid_argument for invalid options, systems and initial
     /// states.
     HandOver(const System& system, const Vector& w0, const HandOverOptions& options)
-        : by_(detail::make_hand_over<N, M>(detail::solver_inclusion(system), detail::resized<N>(w0),
-                                           options, stepping()))
+        : run_(std::make_shared<Run>(system, w0, options))
     {
     }
 
     /// Starts from the state of an earlier run, with its reaction.
     /// @throws std::invalid_argument also if the reaction lies outside the set.
     HandOver(const System& system, const State& start, const HandOverOptions& options)
-        : by_(detail::make_hand_over<N, M>(detail::solver_inclusion(system),
-                                           detail::resized<N, M>(start), options, stepping()))
+        : run_(std::make_shared<Run>(system, start, options))
     {
     }
 
     /// Advances to the end and returns the result, whatever the outcome.
-    [[nodiscard]] HandOverRun<System> take()
-    {
-        return {detail::resized_run<state_size<System>, reaction_size<System>>(
-            detail::take_run<N, M>(*by_))};
-    }
+    [[nodiscard]] HandOverRun<System> take() { return run_->take(); }
 
 private:
-    [[nodiscard]] static detail::EventStepping<N, M> stepping()
-    {
-        if constexpr (Branching<System>) {
-            constexpr bool controlled =
-                std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>;
-            if constexpr (std::is_same_v<Stepping, ErrorControlled<Dopri5>>) {
-                return {&detail::make_dopri5_loop<N, M>, controlled};
-            } else {
-                return {&detail::make_event_loop<N, M, Stepping>, controlled};
-            }
-        } else {
-            return {};
-        }
-    }
-
-    std::shared_ptr<detail::AnyHandOver<N, M>> by_;
+    std::shared_ptr<Run> run_;
 };
 
 /// Runs a whole inclusion in one call.
@@ -108,10 +82,7 @@ requires(!Inclusion<System>)  //
 
 }  // namespace ricochet
 
-#if RICOCHET_ALIGNED_AS_LIBRARY
-RICOCHET_EVENTS_OF(1, 1, Fehlberg78, extern)
-RICOCHET_EVENTS_OF(3, 1, Fehlberg78, extern)
-#else
+#if !RICOCHET_ALIGNED_AS_LIBRARY
 #include "ricochet/nonsmooth/solvers.hpp"
 #endif
 
