@@ -33,14 +33,8 @@ template <class V>
 template <int N, int M, class System>
 auto run_in(const System& system, const StateOf<System>& w0, const HandOverOptions& options)
 {
-    detail::EventStepping<N, M> stepping;
-    if constexpr (Branching<System>) {
-        stepping = {&detail::make_dopri5_loop<N, M>, true};
-    }
-    const auto run =
-        detail::make_hand_over<N, M>(inclusion_of<N, M>(system), resized<N>(w0), options, stepping);
-    return detail::resized_run<state_size<System>, reaction_size<System>>(
-        detail::take_run<N, M>(*run));
+    return detail::RunOfInclusion<System, ErrorControlled<Dopri5>, N, M>(system, w0, options)
+        .take();
 }
 
 template <class Run>

@@ -500,7 +500,7 @@ private:
     void note_change() noexcept { change_due_ = phases_ && step_.ends_at_change(); }
 
     /// Limits the next step to the length that its method allows.
-    [[gnu::noinline]] void limit_to_reach();
+    [[gnu::noinline]] double length_within_reach();
 
     /// Shortens a step only where the domain of the flow ends within it, at the surface of a guard.
     [[nodiscard]] bool take_fixed_step(double h, bool failed = false);

@@ -50,8 +50,10 @@ void Loop<X, single>::continue_from(const X& x, Mode mode, double h)
     for (std::size_t c = 0; c < static_cast<std::size_t>(from.size()); ++c) {
         if (from[c] == x[c]) step_.set_remainder(c, remainder[c]);
     }
-    if (h == 0) h = initial_step(step_, options_, step_.until(options_.t_end));
-    if (h > 0) h_next_ = std::min(h, options_.h_max);
+    if (error_controlled_ && h >= 0) {
+        if (h == 0) h = initial_step(step_, options_, step_.until(options_.t_end));
+        h_next_ = std::min(h, options_.h_max);
+    }
     pending_ = Engine::Pending::settle;
     settle_and_record();
 }

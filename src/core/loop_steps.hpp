@@ -162,7 +162,7 @@ inline void Loop<X, single>::accept()
 template <class X, bool single>
 inline bool Loop<X, single>::take_step(double remaining)
 {
-    if (step_.knows_reach()) limit_to_reach();
+    const double wanted = step_.knows_reach() ? length_within_reach() : h_next_;
     double longest = remaining;
     time_event_due_ = false;
     if (timed_) {
@@ -170,12 +170,12 @@ inline bool Loop<X, single>::take_step(double remaining)
         if (ahead <= remaining) {
             longest = ahead;
             // A remainder of a millionth of a step is rounding, not a step.
-            time_event_due_ = h_next_ * (1 + tolerances::of_remainder) >= longest;
+            time_event_due_ = wanted * (1 + tolerances::of_remainder) >= longest;
         }
     }
-    const bool to_the_end = h_next_ * (1 + tolerances::of_remainder) >= longest;
+    const bool to_the_end = wanted * (1 + tolerances::of_remainder) >= longest;
     is_last_ = to_the_end && longest == remaining;
-    const double h = to_the_end ? longest : h_next_;
+    const double h = to_the_end ? longest : wanted;
     step_.pin(to_the_end ? h : std::numeric_limits<double>::quiet_NaN(),
               is_last_ ? options_.t_end : time_event_);
     const bool taken = error_controlled_ ? take_controlled_step(h, h_next_) : take_fixed_step(h);
@@ -184,13 +184,16 @@ inline bool Loop<X, single>::take_step(double remaining)
 }
 
 template <class X, bool single>
-void Loop<X, single>::limit_to_reach()
+double Loop<X, single>::length_within_reach()
 {
-    if (!error_controlled_) return;
+    // Fixed steps end early at a change alone.
+    if (!error_controlled_ && !step_.locates_changes()) return h_next_;
     // The length has a lower limit: a step that cannot be taken at that length is rejected by its
     // error.
-    const double reach = std::max(step_.reach(options_.rtol, options_.atol), smallest_step());
-    h_next_ = std::min(h_next_, reach);
+    const double reach =
+        std::max(step_.reach(h_next_, options_.rtol, options_.atol), smallest_step());
+    if (error_controlled_) h_next_ = std::min(h_next_, reach);
+    return std::min(h_next_, reach);
 }
 
 template <class X, bool single>

@@ -533,12 +533,13 @@ public:
     /// Whether the length of a step is known before it is taken.
     [[nodiscard]] bool knows_reach() const noexcept { return kernel_->reach; }
     /// Length [s] of the step, if it is known in advance.
-    [[nodiscard]] double reach(double rtol, double atol)
+    [[nodiscard]] double reach(double h, double rtol, double atol)
     {
-        return kernel_->reach(stepping_, state_, rtol, atol);
+        return kernel_->reach(stepping_, state_, h, rtol, atol);
     }
 
     /// Whether the step ends at a change that its stepper has located.
+    [[nodiscard]] bool locates_changes() const noexcept { return kernel_->ends_at_change; }
     [[nodiscard]] bool ends_at_change() const
     {
         return kernel_->ends_at_change && kernel_->ends_at_change(stepping_, state_);
@@ -775,9 +776,11 @@ private:
     [[gnu::cold, gnu::noinline]] void change_stepper()
     {
         const Stepper<X> stepper = system_->phases->stepper(system_.door(), state_.mode);
+        const bool changes = kernel_ != stepper.kernel;
         kernel_ = stepper.kernel;
         stepping_ = stepper.door;
         state_.flow = stepper.flow;
+        if (changes && kernel_->renew) kernel_->renew(stepping_);
     }
 
     void resize(const X& x)

@@ -147,17 +147,6 @@ void add(Statistics& sum, const Statistics& more) noexcept
     sum.evidence.assumed += more.evidence.assumed;
 }
 
-void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept
-{
-    sum.attempted += more.attempted;
-    sum.accepted += more.accepted;
-    sum.rejected += more.rejected;
-    sum.unsolved += more.unsolved;
-    sum.stages += more.stages;
-    sum.iterations += more.iterations;
-    sum.switches += more.switches;
-}
-
 std::optional<PhaseCause> cause_after(Outcome outcome) noexcept
 {
     switch (outcome) {

@@ -6,15 +6,14 @@
 
 #include <fmt/format.h>
 
-#include "ricochet/detail/event_loop.hpp"
-
 namespace ricochet::detail {
 
 namespace {
 
 constexpr double most_patience = 0x1p20;
 /// Events within a hundredth of a step that are no longer worth locating, and events in a row
-/// between which a y stays within its error: as for hand-overs (hand_over_watches.hpp).
+/// between which a y stays within its error: their times are then determined by rounding, and
+/// unlike those of an accumulation they need not become denser.
 constexpr double most_events = 200, most_flutters = 400;
 
 }  // namespace
@@ -31,6 +30,7 @@ PhaseRules::PhaseRules(const BranchPhases& any, bool by_mode, const PhaseOptions
         numbers->assign(count_, 0);
     }
     flow_.assign(size_, 0);
+    if (options.alone) stall_ = {options.t_start, options.t_end, options.alone->stall_steps};
     arrived_.assign(count_, false);
     branch_guards_.assign(BranchPhases::guards_of_reaction * count_, 1);
 }
@@ -103,12 +103,13 @@ void PhaseRules::guards(Kind kind, double t, const double* x, std::span<double> 
     if (is_explicit(kind)) {
         inclusion().guards(branches_of(kind), t, x, branch_guards_.data());
         for (std::size_t i = 0; i < count(); ++i) {
-            std::copy_n(branch_guards_.data() + from * i, from, g.data() + guards_of_reaction * i);
+            std::copy_n(branch_guards_.data() + from * i, from,
+                        g.data() + guards_of_reaction() * i);
         }
     } else if (kind == own) {
         inclusion().observe(t, x, branch_guards_.data());
         for (std::size_t i = 0; i < count(); ++i) {
-            g[guards_of_reaction * i + from] = branch_guards_[i];
+            g[guards_of_reaction() * i + from] = branch_guards_[i];
         }
     }
 }
@@ -133,12 +134,12 @@ void PhaseRules::guard_rates(Kind kind, double t, const double* x, const double*
         inclusion().guard_rates(branches_of(kind), t, x, dxdt, branch_guards_.data());
         for (std::size_t i = 0; i < count(); ++i) {
             std::copy_n(branch_guards_.data() + from * i, from,
-                        rates.data() + guards_of_reaction * i);
+                        rates.data() + guards_of_reaction() * i);
         }
     } else if (kind == own) {
         for (std::size_t i = 0; i < count(); ++i) {
             if (!now_->watched[i]) continue;
-            const std::size_t which = guards_of_reaction * i + from;
+            const std::size_t which = guards_of_reaction() * i + from;
             rates[which] = guard_rate(which, kind, t, x, dxdt);
         }
     }
@@ -155,17 +156,24 @@ bool PhaseRules::are_clear(Mode b, double t, const double* x)
     return true;
 }
 
+bool PhaseRules::lets_go(Mode b, double t, const double* x)
+{
+    if (options_.alone && !options_.alone->until_released) return false;
+    return !inclusion().holds(b) && are_clear(b, t, x);
+}
+
 bool PhaseRules::is_near_surface(double t, const double* x)
 {
     inclusion().observe(t, x, y_.data());
     for (std::size_t i = 0; i < count(); ++i) {
-        if (std::fabs(y_[i]) <= 1e3 * resolution(i, x)) return true;
+        if (!is_clear(i, y_[i], x)) return true;
     }
     return false;
 }
 
 std::size_t PhaseRules::unbounded(Mode at, double t, const double* x)
 {
+    if (!inclusion().has_branches()) return no_reaction;
     inclusion().bounds(t, x, lower_.data(), upper_.data());
     for (std::size_t i = 0; i < count(); ++i) {
         const Branch branch = BranchPhases::branch(i, at);
@@ -197,13 +205,22 @@ Kind PhaseRules::enter(double t, double* x)
         if (const std::size_t i = unbounded(at, t, x); by_mode_ && i != no_reaction) {
             throw InclusionRefused("integrate: at the start " + sentence_of_unbounded(i));
         }
-        const Mode b = inclusion().start(t, x);
+        const Mode b = start(t, x);
         kind = determined_kind(at, b, t, x, PhaseCause::start);
     }
     note_sides(t, x);
-    note(kind, t, PhaseCause::start);
+    note(kind, t, options_.alone && is_implicit(kind) ? cause_ : PhaseCause::start);
     begins_ = true;
-    return kind;
+    return kind_ = kind;
+}
+
+Mode PhaseRules::start(double t, double* x)
+{
+    if (!options_.alone || options_.alone->reaction.empty()) return inclusion().start(t, x);
+    const double size = std::fabs(*std::max_element(
+        x, x + size_, [](double a, double b) { return std::fabs(a) < std::fabs(b); }));
+    const double error = options_.atol + options_.rtol * size;
+    return inclusion().resume(t, x, options_.alone->reaction.data(), 10 * error);
 }
 
 Kind PhaseRules::enter_mode(Kind before, double t, double* x)
@@ -222,6 +239,7 @@ Kind PhaseRules::enter_mode(Kind before, double t, double* x)
 
 bool PhaseRules::goes_by_itself(double t, const double* x)
 {
+    if (options_.alone) return false;
     inclusion().observe(t, x, y_.data());
     for (std::size_t i = 0; i < count(); ++i) {
         if (now_->watched[i] && !is_clear(i, y_[i], x)) return false;
@@ -254,6 +272,7 @@ Kind PhaseRules::kind_for(Mode b, double t, const double* x, PhaseCause cause)
     const Mode several = branch_modes_;
     cause_ = cause;
     if (b < several) return explicit_in(b);
+    if (!inclusion().has_branches()) return go_by_steps(PhaseCause::no_modes, t, x);
     if (b == several) return go_by_steps(PhaseCause::several, t, x);
     if (b == several + 1) return go_by_steps(PhaseCause::no_flow, t, x);
     inclusion().note_faulty(t, x);
@@ -273,7 +292,8 @@ Kind PhaseRules::go_by_steps(PhaseCause cause, double t, const double* x)
     memory_.steps = 0;
     cause_ = cause;
     Mode b = 0;
-    if (inclusion().keeps_to_branches()) return end_with(Outcome::not_handed_over);
+    const bool events_only = options_.alone && options_.alone->events_only;
+    if (events_only || inclusion().keeps_to_branches()) return end_with(Outcome::not_handed_over);
     if (!inclusion().select(t, x, b)) return end_with(Outcome::not_converged);
     memory_.across = b;
     return chatters ? across() : implicit_in(b);
@@ -320,7 +340,9 @@ Kind PhaseRules::decide_own(const Set& set, double* x)
         const bool of_set = fired.which != no_guard && kind_of_guard(fired.which) == 4;
         if (of_set) return kind_for(branch_modes_ + 2, set.t, x, cause_);
         if (fired.asks != no_reaction) {
-            asks = asks || BranchPhases::branch(fired.asks, at) == Branch::inside;
+            asks = asks || (inclusion().has_branches()
+                                ? BranchPhases::branch(fired.asks, at) == Branch::inside
+                                : !is_clear(fired.asks, y_[fired.asks], x));
             continue;
         }
         const std::size_t i = fired.which != no_guard ? reaction_of(fired.which) : fired.reaction;
@@ -477,6 +499,7 @@ bool PhaseRules::is_flow(double t, const double* x, const double* rate)
 
 void PhaseRules::note_changes(const Set& set, Mode before, Kind next, const double* x)
 {
+    if (!inclusion().has_branches()) return;
     inclusion().bounds(set.t, x, lower_.data(), upper_.data());
     const Mode after = next == across() ? static_cast<Mode>(memory_.across) : branches_of(next);
     for (std::size_t i = 0; i < count(); ++i) {
@@ -503,6 +526,7 @@ void PhaseRules::note_changes(const Set& set, Mode before, Kind next, const doub
             }
         }
         changes_.push_back(change);
+        if (options_.alone) branch_changes_.push_back({before, after});
     }
 }
 
@@ -572,8 +596,19 @@ PhaseRules::Verdict PhaseRules::change_to(Kind kind, double t, PhaseCause cause,
     return {PhaseVerdict::Kind::changes, kind, h};
 }
 
+PhaseRules::Verdict PhaseRules::release(double t)
+{
+    if (options_.alone) return {PhaseVerdict::Kind::ends, kind_, 0, Outcome::released};
+    return change_to(own, t, PhaseCause::released, -1);
+}
+
 PhaseRules::Verdict PhaseRules::review(const Step& step, double* x)
 {
+    kind_ = step.kind;
+    steps_ += step.has_advanced;
+    if (stall_(step.t, steps_)) {
+        return {PhaseVerdict::Kind::ends, step.kind, 0, Outcome::stalled};
+    }
     if (step.kind == over()) {
         return {PhaseVerdict::Kind::ends, step.kind, 0, static_cast<Outcome>(memory_.outcome)};
     }
@@ -619,7 +654,7 @@ PhaseRules::Verdict PhaseRules::review_own(const Step& step, const double* x)
         if (may_arrive(step, 4 * step.h_next)) return {};
         return change_to(own, step.t, PhaseCause::released, -1);
     }
-    if (!may_arrive(step, 2 * step.h_next)) return {};
+    if (!inclusion().has_branches() || !may_arrive(step, 2 * step.h_next)) return {};
     const Mode b = inclusion().signs(step.t, x);
     const bool plain = !inclusion().holds(b) && has_finite_bounds(b, step.t, x);
     if (!plain || !is_flow_of(b, step, x)) return {};
@@ -649,7 +684,7 @@ PhaseRules::Verdict PhaseRules::review_explicit(Kind kind, double t, double* x)
         return change_to(go_by_steps(cause, t, x), t, cause, options_.step);
     };
     if (contradicts) return by_steps(PhaseCause::contradiction);
-    if (!inclusion().holds(b) && are_clear(b, t, x)) return release(t);
+    if (lets_go(b, t, x)) return release(t);
     if (chatters(t)) return by_steps(PhaseCause::chattering);
     if (memory_.fluttering > most_flutters) {
         inclusion().hold(inclusion().signs(t, x), t, x);
@@ -674,7 +709,7 @@ PhaseRules::Verdict PhaseRules::review_implicit(Kind kind, double t, bool has_ad
         if (b != static_cast<Mode>(memory_.across)) memory_.steps = 0;
         memory_.across = b;
     }
-    if (!inclusion().holds(b) && are_clear(b, t, x)) return release(t);
+    if (lets_go(b, t, x)) return release(t);
     if (memory_.steps < memory_.patience || !inclusion().flows(b)) return {};
     // The branch of a y that has just left zero tells its direction, so its size is not tested.
     Mode tested = b;
@@ -713,6 +748,7 @@ PhaseRules::Verdict PhaseRules::ask(const End& end, double* x, PhaseCause cause)
 
 PhaseRules::Verdict PhaseRules::give_up(const End& end, double* x)
 {
+    kind_ = end.kind;
     reason_.clear();
     if (is_implicit(end.kind)) {
         const bool unsolved =
@@ -751,6 +787,20 @@ PhaseRules::Verdict PhaseRules::give_up(const End& end, double* x)
         inclusion().hold(at, end.t, x);
     }
     return change_to(go_by_steps(*cause, end.t, x), end.t, *cause, options_.step);
+}
+
+// --- records ---
+
+EndInBranches PhaseRules::end_in_branches(double t, const double* x) const
+{
+    EndInBranches end{branch_modes_, std::vector<double>(count()), branch_changes_};
+    if (is_explicit(kind_)) {
+        end.mode = branches_of(kind_);
+        inclusion().reaction(end.mode, t, x, end.reaction.data());
+    } else {
+        inclusion().reaction_of_step(end.reaction.data());
+    }
+    return end;
 }
 
 // --- memory ---

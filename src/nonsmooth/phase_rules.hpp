@@ -10,13 +10,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "../core/phase_table.hpp"
 #include "ricochet/detail/branch_phases.hpp"
-#include "ricochet/detail/hand_over_run.hpp"
+#include "ricochet/detail/phased_run.hpp"
+#include "ricochet/detail/stall_watch.hpp"
 
 namespace ricochet::detail {
 
@@ -26,7 +28,8 @@ using Kind = Mode;
 struct PhaseOptions {
     double t_start = 0, t_end = 0;  ///< [s]
     double rtol = 0, atol = 0;
-    double step = 0;  ///< [s] length of implicit steps
+    double step = 0;  ///< [s] longest implicit steps; with fixed steps their length
+    std::optional<AloneOptions> alone{};
 };
 
 /// The inclusion of a mode of the system.
@@ -41,8 +44,6 @@ struct ModeInclusion {
 class PhaseRules {
 public:
     static constexpr Kind own = 0;
-    /// Those of `BranchPhases`, and y, which is watched in own phases.
-    static constexpr std::size_t guards_of_reaction = BranchPhases::guards_of_reaction + 1;
 
     /// @param any      the inclusion of some mode, which has the sizes of all
     /// @param by_mode  there is one inclusion for each mode, which holds wherever the mode does
@@ -61,6 +62,12 @@ public:
         return *this;
     }
     [[nodiscard]] const ModeInclusion& now() const noexcept { return *now_; }
+
+    /// Those of `BranchPhases`, and y, which is watched in own phases.
+    [[nodiscard]] std::size_t guards_of_reaction() const noexcept
+    {
+        return BranchPhases::guards_of_reaction + (options_.alone ? 0 : 1);
+    }
 
     // --- kinds ---
 
@@ -172,6 +179,8 @@ public:
 
     // --- records ---
 
+    /// Of an inclusion alone.
+    [[nodiscard]] EndInBranches end_in_branches(double t, const double* x) const;
     /// A sentence about the end that the rules have given to the run.
     [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
     [[nodiscard]] const std::vector<Phase>& phases() const noexcept { return phases_; }
@@ -209,7 +218,7 @@ private:
     [[nodiscard]] Kind implicit_in(Mode b) const noexcept { return 1 + branch_modes_ + b; }
     [[nodiscard]] bool is_set_valued(Kind kind) const noexcept
     {
-        return holds(kind) || is_implicit(kind);
+        return is_implicit(kind) || (!options_.alone && holds(kind));
     }
     [[nodiscard]] bool has_inclusion() const noexcept { return now_->inclusion != nullptr; }
     [[nodiscard]] BranchPhases& inclusion() const noexcept { return *now_->inclusion; }
@@ -220,13 +229,16 @@ private:
     {
         return options_.atol + options_.rtol * inclusion().size_of_row(i, x);
     }
-    /// Whether y_i is farther from zero than the error of a thousand steps.
+    /// Whether y_i is farther from zero than the error of a thousand steps, and the motion thus
+    /// that of a flow.
     [[nodiscard]] bool is_clear(std::size_t i, double y, const double* x) const
     {
-        return std::fabs(y) >= 1e3 * resolution(i, x);
+        return inclusion().decides_at_zero() && std::fabs(y) >= 1e3 * resolution(i, x);
     }
     /// Whether the y of all reactions at a bound are.
     [[nodiscard]] bool are_clear(Mode b, double t, const double* x);
+    /// Whether branches b hold nothing and every y is clear.
+    [[nodiscard]] bool lets_go(Mode b, double t, const double* x);
     [[nodiscard]] bool is_near_surface(double t, const double* x);
 
     [[nodiscard]] Kind decide_own(const Set& set, double* x);
@@ -240,6 +252,8 @@ private:
         return unbounded(at, t, x) == no_reaction;
     }
 
+    /// The mode of `BranchPhases` in which a run starts.
+    [[nodiscard]] Mode start(double t, double* x);
     /// Whether the system's own flow is followed from (t, x).
     [[nodiscard]] bool goes_by_itself(double t, const double* x);
     /// The kind of phase where the y of the reactions marked inside are zero.
@@ -279,21 +293,22 @@ private:
     [[nodiscard]] Verdict review_explicit(Kind kind, double t, double* x);
     [[nodiscard]] Verdict review_implicit(Kind kind, double t, bool has_advanced, double* x);
     [[nodiscard]] Verdict change_to(Kind kind, double t, PhaseCause cause, double h = 0);
-    [[nodiscard]] Verdict release(double t) { return change_to(own, t, PhaseCause::released, -1); }
+    /// The system's own flow is followed again; an inclusion alone ends.
+    [[nodiscard]] Verdict release(double t);
 
-    [[nodiscard]] static std::size_t reaction_of(std::size_t which) noexcept
+    [[nodiscard]] std::size_t reaction_of(std::size_t which) const noexcept
     {
-        return which / guards_of_reaction;
+        return which / guards_of_reaction();
     }
-    [[nodiscard]] static std::size_t kind_of_guard(std::size_t which) noexcept
+    [[nodiscard]] std::size_t kind_of_guard(std::size_t which) const noexcept
     {
-        return which % guards_of_reaction;
+        return which % guards_of_reaction();
     }
-    [[nodiscard]] static std::size_t in_branches(std::size_t which) noexcept
+    [[nodiscard]] std::size_t in_branches(std::size_t which) const noexcept
     {
         return BranchPhases::guards_of_reaction * reaction_of(which) + kind_of_guard(which);
     }
-    [[nodiscard]] static bool watches_own(std::size_t which) noexcept
+    [[nodiscard]] bool watches_own(std::size_t which) const noexcept
     {
         return kind_of_guard(which) == BranchPhases::guards_of_reaction;
     }
@@ -313,10 +328,13 @@ private:
     std::vector<std::size_t> kept_;
     mutable std::vector<double> branch_guards_;
     std::vector<ReactionChange> changes_;
+    std::vector<BranchChange> branch_changes_;  ///< of an inclusion alone
     std::vector<Phase> phases_;
+    Kind kind_ = own;                       ///< at the end of the last step
     bool begins_ = false;                   ///< no step has been taken since the start
     PhaseCause cause_ = PhaseCause::start;  ///< why the phase that was entered last began
-    std::uint64_t implicit_steps_ = 0;
+    std::uint64_t steps_ = 0, implicit_steps_ = 0;
+    StallWatch stall_;  ///< of an inclusion alone
 };
 
 }  // namespace ricochet::detail

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "phased_system.hpp"
-#include "ricochet/detail/event_loop.hpp"
+#include "ricochet/detail/lending_loop.hpp"
 
 namespace ricochet::detail {
 
@@ -14,16 +14,21 @@ template <class C>
 class PhasedRunOf final : public PhasedRun<C> {
 public:
     PhasedRunOf(PhasedSetup<C>&& setup, const C& x0, const Options& options)
-        : setup_(setup.user), system_(std::move(setup), x0, phase_options(options))
+        : setup_(setup.user),
+          system_(std::move(setup), x0,
+                  phase_options(options, setup_.error_controlled, setup.alone))
     {
         setup_.system = &system_.table();
         setup_.door = &system_;
         setup_.quiet = nullptr;
         setup_.quiet_on_series = false;
+        const bool alone = system_.rules().options().alone.has_value();
         C x = x0;
         Options inner = options;
         inner.mode = system_.enter(options.mode, options.t_start, x);
-        loop_ = make_loop(setup_, x, inner);
+        // A run of an inclusion alone is not continued after exceptions.
+        loop_ = alone ? Owner<AnyLoop<C>>(make_lending_loop(setup_, x, inner).release())
+                      : make_loop(setup_, x, inner);
     }
 
     [[nodiscard]] AnyLoop<C>& loop() noexcept override { return *loop_; }
@@ -56,16 +61,24 @@ public:
         return out;
     }
     [[nodiscard]] const StageReport& failure() const noexcept override { return system_.failure(); }
+    [[nodiscard]] EndInBranches end_in_branches() const override
+    {
+        return system_.rules().end_in_branches(loop_->t(), loop_->x().data());
+    }
 
 private:
-    [[nodiscard]] static PhaseOptions phase_options(const Options& options)
+    [[nodiscard]] static PhaseOptions phase_options(const Options& options, bool error_controlled,
+                                                    const std::optional<AloneOptions>& alone)
     {
         const HandOverOptions of = completed(options_of_phases(options), false);
         return {.t_start = of.t_start,
                 .t_end = of.t_end,
                 .rtol = of.rtol,
                 .atol = of.atol,
-                .step = of.set_valued.step};
+                .step = alone              ? alone->step
+                        : error_controlled ? of.set_valued.step
+                                           : options.step,
+                .alone = alone};
     }
 
     RunSetup<C> setup_;
@@ -97,10 +110,29 @@ HandOverOptions options_of_phases(const Options& options)
 
 BranchPhasesOptions branch_options(const Options& options)
 {
-    const HandOverOptions of = completed(options_of_phases(options), false);
-    return {.scheme = of.set_valued.scheme,
-            .step = of.set_valued.step,
-            .event_tolerance = of.event_tolerance};
+    return branch_options(completed(options_of_phases(options), false));
+}
+
+BranchPhasesOptions branch_options(const HandOverOptions& completed)
+{
+    return {.scheme = completed.set_valued.scheme,
+            .step = completed.set_valued.step,
+            .event_tolerance = completed.event_tolerance};
+}
+
+Options options_of_branches(const HandOverOptions& completed)
+{
+    Options out{.t_start = completed.t_start,
+                .t_end = completed.t_end,
+                .rtol = completed.rtol,
+                .atol = completed.atol,
+                .h_max = completed.h_max,
+                .event_tolerance = completed.event_tolerance};
+    out.sample_times = completed.sample_times;
+    out.max_steps = completed.max_steps;
+    out.stall_steps = completed.stall_steps;
+    out.cancelled = completed.cancelled;
+    return out;
 }
 
 template <>

@@ -44,6 +44,7 @@ public:
     PhasedSystem(PhasedSetup<C>&& setup, const C& x0, const PhaseOptions& options)
         : user_(setup.user),
           own_(*setup.user.system),
+          own_kernel_(*setup.user.kernel),
           by_mode_(setup.by_mode),
           start_mode_(setup.start_mode),
           change_(setup.change),
@@ -60,6 +61,7 @@ public:
             infos_.push_back(own_.info(user_.door, i));
             infos_.back().resets = infos_.back().resets && own_.resets();
         }
+        refuse_other_size(x0.size());
         make_modes(x0);
         find_asked_reactions();
         make_kernels(setup.method, x0.size());
@@ -132,6 +134,7 @@ private:
     [[nodiscard]] bool is_active(Mode mode) const;
 
     [[nodiscard]] const BranchPhases& some_inclusion() const;
+    void refuse_other_size(std::size_t size) const;
     void make_modes(const C& x0);
     void find_asked_reactions();
     void refuse_partly_active() const;
@@ -147,7 +150,7 @@ private:
 
     [[nodiscard]] std::size_t all_guards() const noexcept
     {
-        return guards_ + PhaseRules::guards_of_reaction * reactions_;
+        return guards_ + rules_.guards_of_reaction() * reactions_;
     }
     [[nodiscard]] GuardInfo info(std::size_t i) const
     {
@@ -260,9 +263,16 @@ private:
     [[nodiscard]] Stepper<C> stepper(Mode mode)
     {
         const Kind kind = kind_of(mode);
-        if (kind == PhaseRules::own) return {user_.kernel, user_.door, own_.flow};
+        if (kind == PhaseRules::own) return {&own_kernel_, user_.door, own_.flow};
         if (rules_.is_implicit(kind)) return {&implicit_, this, table_.flow};
-        return {in(own_mode(mode)).holds(kind) ? &held_ : free_, this, table_.flow};
+        const bool holds = in(own_mode(mode)).holds(kind);
+        if (!rules_.is_explicit(kind)) return {free_, this, table_.flow};
+        explicit_ = {&*rules_.now().inclusion, rules_.branches_of(kind)};
+        return {holds ? &held_ : free_, this, [](void* door, Mode, double t, const C& x, C& dxdt) {
+                    const InBranches& here = at(door).explicit_;
+                    here.inclusion->flow(here.branches, t, x.data(), dxdt.data());
+                    return true;
+                }};
     }
     bool flow(Mode mode, double t, const C& x, C& dxdt)
     {
@@ -311,24 +321,45 @@ private:
     {
         return *inclusion_of(own_mode(step.mode)).inclusion;
     }
-    [[nodiscard]] double take_implicit(StepState<C>& step, double h)
+    /// False where a stage has no solution.
+    [[nodiscard]] bool take_implicit(StepState<C>& step, double h)
     {
         step.h = h;
         step.has_middle = false;
         step.asked_alone = 0;
         ++step.flow_calls;
-        const bool solved =
-            inclusion(step).take(implicit_start(step), h, step.x1.data(), step.rate1.data());
-        if (!solved) return std::numeric_limits<double>::quiet_NaN();
+        const ImplicitEnd end{step.x1.data(), step.rate1.data(), step.error.data()};
+        if (!inclusion(step).take(implicit_start(step), h, end)) return false;
         for_each_component(
             step.x1, [&](auto i) { step.w[i] = (step.x1[i] - step.x0[i]) - h * step.rate0[i]; });
-        return 0;
+        return true;
+    }
+    /// Below a billionth of a longest step the motion has no smoothness that shorter ones could
+    /// follow.
+    [[nodiscard]] double attempt_implicit(StepState<C>& step, double h, double rtol, double atol)
+    {
+        if (!take_implicit(step, h)) return std::numeric_limits<double>::quiet_NaN();
+        double worst = 0;
+        for_each_component(step.x1, [&](auto i) {
+            const auto c = static_cast<std::size_t>(i);
+            const double least = step.component_atol ? step.component_atol[c] : atol;
+            const double size = std::max(std::fabs(step.x0[i]), std::fabs(step.x1[i]));
+            const double most = std::max(least + rtol * size, least_tolerance);
+            const double error = std::fabs(step.error[i]) / most;
+            if (!(error <= worst)) worst = error;
+        });
+        const double rounding =
+            32 * std::numeric_limits<double>::epsilon() * std::fabs(step.start.value);
+        const double least = std::max(1e-9 * rules_.options().step, rounding);
+        // The steps of an inclusion alone are as long as they are asked for.
+        if (rules_.options().alone) return worst == worst ? 0 : worst;
+        return h <= least ? std::min(worst, 1.0) : worst;
     }
     void depart(StepState<C>& step, double s, C& w, C& rate)
     {
         assign(w, step.x0);
         assign(rate, step.rate0);
-        inclusion(step).take_to(implicit_start(step), step.h, s, w.data(), rate.data());
+        inclusion(step).take_to(implicit_start(step), step.h, s, {w.data(), rate.data()});
         for_each_component(w, [&](auto i) {
             w[i] = (w[i] - step.x0[i]) - s * step.rate0[i];
             rate[i] -= step.rate0[i];
@@ -346,8 +377,14 @@ private:
         return std::max(error, std::pow(0.9 / fraction, free_->error_order + 1));
     }
 
+    struct InBranches {
+        const BranchPhases* inclusion = nullptr;
+        Mode branches = 0;
+    };
+
     RunSetup<C> user_;
     const SystemTable<C>& own_;
+    StepKernel<C> own_kernel_;
     bool by_mode_;  ///< one inclusion for each mode, else the first in all modes
     Mode (*start_mode_)(void* door, Mode mode, double t, const C& x);
     Mode (*change_)(void* door, std::size_t reaction, EventKind kind, Mode mode, double t, C& x);
@@ -365,6 +402,7 @@ private:
     std::vector<std::size_t> own_fired_;
     std::vector<PhaseRules::Fired> fired_;
     std::vector<ReactionChange> changes_;
+    InBranches explicit_;  ///< of the steps, in an explicit phase
     const StepKernel<C>* free_ = nullptr;
     StepKernel<C> held_, implicit_;
     SystemTable<C> table_;
@@ -379,6 +417,18 @@ const BranchPhases& PhasedSystem<C>::some_inclusion() const
     }
     throw std::invalid_argument(
         "integrate: set_valued(mode) gives no mode an inclusion; expected it to give one to some");
+}
+
+template <class C>
+void PhasedSystem<C>::refuse_other_size(std::size_t size) const
+{
+    for (const auto& inclusion : inclusions_) {
+        if (!inclusion || inclusion->size() == size) continue;
+        throw std::invalid_argument(
+            fmt::format("integrate: the inclusion of set_valued has {} components, the state {}; "
+                        "expected as many",
+                        inclusion->size(), size));
+    }
 }
 
 template <class C>
@@ -564,6 +614,9 @@ Mode PhasedSystem<C>::after_changes(Mode decided, double t, C& x)
 template <class C>
 void PhasedSystem<C>::make_kernels(MethodName method, std::size_t size)
 {
+    // Power series are those of the user's guards alone.
+    own_kernel_.guard_series = nullptr;
+    own_kernel_.cross = nullptr;
     free_ = &kernel_by_name<C>(method, size);
     held_ = *free_;
     held_.attempt = [](void* door, StepState<C>& step, double h, double rtol, double atol) {
@@ -572,17 +625,18 @@ void PhasedSystem<C>::make_kernels(MethodName method, std::size_t size)
     implicit_.order = implicit_.error_order = 2;
     implicit_.end_rate = true;
     implicit_.take = [](void* door, StepState<C>& step, double h) {
-        return at(door).take_implicit(step, h) == 0;
-    };
-    implicit_.attempt = [](void* door, StepState<C>& step, double h, double, double) {
         return at(door).take_implicit(step, h);
+    };
+    implicit_.attempt = [](void* door, StepState<C>& step, double h, double rtol, double atol) {
+        return at(door).attempt_implicit(step, h, rtol, atol);
     };
     implicit_.depart = [](void* door, StepState<C>& step, double s, C& w, C& rate) {
         at(door).depart(step, s, w, rate);
     };
-    implicit_.reach = [](void* door, StepState<C>& step, double, double) {
+    implicit_.reach = [](void* door, StepState<C>& step, double h, double, double) {
         PhasedSystem& me = at(door);
-        return me.inclusion(step).reach(me.implicit_start(step), me.rules_.options().step);
+        return me.inclusion(step).reach(me.implicit_start(step),
+                                        std::min(h, me.rules_.options().step));
     };
     implicit_.ends_at_change = [](void* door, const StepState<C>& step) {
         return at(door).inclusion(step).ends_at_change();

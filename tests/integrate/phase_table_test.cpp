@@ -31,7 +31,7 @@ public:
     {
         up_ = kernel_by_name<C>(MethodName::dopri5, 1);
         down_ = kernel_by_name<C>(MethodName::fehlberg78, 1);
-        down_.reach = [](void*, StepState<C>& step, double, double) {
+        down_.reach = [](void*, StepState<C>& step, double, double, double) {
             return (step.x0[0] - 0.5) / 2;
         };
         down_.ends_at_change = [](void*, const StepState<C>& step) {

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 
+#include "ricochet/detect/planned.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 
 using namespace ricochet;
@@ -17,6 +18,7 @@ using Reaction = Eigen::Matrix<double, 1, 1>;
 // CASE 7: found no `smooth` that fits
 // CASE 8: found no `reaction_set` that fits
 // CASE 9: found a system that is no inclusion
+// CASE 11 alone: found a system with set_valued() and a detector whose predictions or bounds are
 // CASE 10 alone: found an inclusion of more than 8 components or 4 reactions, which the library has
 // not compiled
 struct Block {
@@ -82,6 +84,15 @@ struct Block {
 #endif
 };
 
+/// A system that declares bounds of its guard, for `Planned`.
+struct Beside {
+    using State = std::array<double, 2>;
+    static void flow(double, const State& x, State& dxdt) { dxdt = {x[1], -x[0]}; }
+    static double guard(double, const State& x) { return x[1]; }
+    static double speed_bound(double, const State&) { return 1; }
+    static Block set_valued() { return {}; }
+};
+
 struct Large {
     static constexpr int state_size = 9;
     static constexpr int reaction_size = 1;
@@ -94,6 +105,9 @@ void run()
 {
 #if CASE == 10
     (void)hand_over(Large{}, Large::Vector::Zero(), {.t_end = 1});
+#elif CASE == 11
+    const Beside::State x0{1, 0};
+    Simulation simulation(Beside{}, x0, {.t_end = 1}, ErrorControlled<Dopri5>{}, Planned{});
 #else
     (void)hand_over(Block{}, State(0, 0), {.t_end = 1});
 #endif

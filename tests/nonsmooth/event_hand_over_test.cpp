@@ -13,7 +13,6 @@
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
-#include "sliding_systems.hpp"
 
 namespace ricochet::event_hand_over_test {
 namespace {
@@ -411,54 +410,6 @@ TEST(EventHandOver, StopsAfterOneEventAndAfterSeveral)
     const auto later = integrate(Ended{{}, 2}, x0, {.t_end = 10});
     EXPECT_EQ(later.outcome, Outcome::stopped_by_event);
     EXPECT_GT(later.t, run.t);
-}
-
-// --- what runs in separate parts, by events and by the inclusion: here for its fixed steps ---
-
-TEST(EventHandOver, RunsInPartsRefuseToCountEvents)
-{
-    const Ended::State x0{2.5, 0.1};
-    EXPECT_THROW((void)integrate(Ended{{}, 2}, x0, {.t_end = 10, .step = 0.01}, FixedStep<Rk4>{}),
-                 std::invalid_argument);
-    EXPECT_THROW(
-        (void)integrate(Ended{{}, 1}, x0, {.t_end = 1, .step = 0.01, .stop_at_event = true},
-                        FixedStep<Rk4>{}),
-        std::invalid_argument);
-}
-
-/// A block that slides, and beside it a ball with restitution 1/2.
-[[nodiscard]] Slider<3> block_and_ball(bool throws)
-{
-    GuardInfo floor;
-    floor.unilateral = true;
-    using X = Slider<3>::State;
-    return {.f =
-                [throws](double t, const X& x, X& dxdt) {
-                    if (throws && t > 1.2) throw std::invalid_argument("table ends at 1.2 s");
-                    dxdt = {0, x[2], -1};
-                },
-            .own = {{floor, [](double, const X& x) { return x[1]; },
-                     [](double, X& x) { x[2] = -0.5 * x[2]; }}}};
-}
-
-TEST(EventHandOver, AnExceptionOfTheFlowPassesThroughRunsInParts)
-{
-    // It is thrown where the block has stopped, at 1 s, and the inclusion is followed.
-    EXPECT_EQ(refusal([&] {
-                  (void)integrate(block_and_ball(true), {1, 1.125, 0}, {.t_end = 3, .step = 0.01},
-                                  FixedStep<Rk4>{});
-              }),
-              "table ends at 1.2 s");
-}
-
-TEST(EventHandOver, AnAccumulationThatNoReactionEndsEndsARunInParts)
-{
-    // The bounces end at 4.5, long before the block stops at 10.
-    const auto run = integrate(block_and_ball(false), {10, 1.125, 0}, {.t_end = 6, .step = 0.01},
-                               FixedStep<Rk4>{});
-    EXPECT_EQ(run.outcome, Outcome::zeno);
-    EXPECT_EQ(run.guard, 1U);
-    EXPECT_NEAR(run.t, 4.5, 1e-6);
 }
 
 TEST(EventHandOver, RefusesWhatAHandOverDoesNotHave)

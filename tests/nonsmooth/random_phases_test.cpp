@@ -24,15 +24,15 @@ using test::WithSawtooth;
 
 using State = std::array<double, 6>;
 
-/// Implicit steps, a thousandth of the run each, are of order two, but of order one across changes
-/// that are not located: as for `ReferenceMotion::allowed`, a thousandth of the motion, or its
-/// change in two steps.
+/// The implicit steps of the reference are of order two, but of order one across changes that are
+/// not located: as for `ReferenceMotion::allowed`, a thousandth of the motion, or its change in two
+/// steps.
 constexpr double of_motion = 1e-3;
 
 template <int M>
-[[nodiscard]] Options options_of(const WithSawtooth<M>& system)
+[[nodiscard]] Options options_of(const WithSawtooth<M>& system, double rtol = 1e-9)
 {
-    return {.t_end = system.inclusion.t_end, .rtol = 1e-9, .atol = 1e-11};
+    return {.t_end = system.inclusion.t_end, .rtol = rtol, .atol = rtol / 100};
 }
 
 template <class Run, int M>
@@ -73,6 +73,22 @@ void expect_motion_of_inclusion(const State& x, double t, const RandomInclusion<
     }
 }
 
+/// Each step has an error of at most its tolerance, of which the motion makes at most ten times as
+/// much; a tenth of the tolerance leaves a fifth of it in steps of order two.
+template <int M>
+void expect_errors_of_steps(const MixedRun<State>& run, const WithSawtooth<M>& system,
+                            const State& x0)
+{
+    const State x = integrate(system, x0, options_of(system, 1e-10)).x;
+    const auto steps =
+        static_cast<double>(run.statistics.event_driven.steps + run.statistics.set_valued.accepted);
+    double size = 1;
+    for (const double component : x) size = std::max(size, std::fabs(component));
+    for (std::size_t i = 0; i < x.size(); ++i) {
+        EXPECT_NEAR(run.x[i], x[i], 10 * steps * 1e-9 * size) << i;
+    }
+}
+
 template <int M>
 void follow(const RandomInclusion<4>& full, std::uint64_t seed)
 {
@@ -82,6 +98,7 @@ void follow(const RandomInclusion<4>& full, std::uint64_t seed)
     const auto run = integrate(system, x0, options_of(system));
     expect_teeth(run, system);
     expect_motion_of_inclusion(run.x, run.t, system.inclusion);
+    expect_errors_of_steps(run, system, x0);
 
     Simulation stepped(system, x0, options_of(system));
     for (int k = 1; stepped.step(); ++k) {

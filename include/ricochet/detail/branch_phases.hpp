@@ -5,7 +5,8 @@
 // A branch mode b has digit i to base 3 for the branch of reaction i: 0 lower (y > 0), 1 inside
 // (held), 2 upper (y < 0); `branch_modes()` and the two numbers after it are the modes that do not
 // flow by themselves, `several`, `no_flow` and `empty` of branch_modes.hpp. States are arrays of
-// `size()` doubles.
+// `size()` doubles. What is followed by implicit steps alone has mode 0 and none of the explicit
+// phases; where another inclusion decides on a mode, it gives `several`.
 #pragma once
 
 #include <cstddef>
@@ -33,6 +34,13 @@ struct ImplicitStart {
     bool crosses;  ///< the step is taken across changes of branch
 };
 
+/// Where the end of an implicit step is written.
+struct ImplicitEnd {
+    double* x;
+    double* dxdt;
+    double* error = nullptr;  ///< its estimate, if it is asked for
+};
+
 class BranchPhases {
 public:
     BranchPhases() = default;
@@ -42,8 +50,9 @@ public:
 
     [[nodiscard]] virtual std::size_t size() const noexcept = 0;
     [[nodiscard]] virtual std::size_t reactions() const noexcept = 0;
-    /// Number of branch modes.
+    /// Number of branch modes; 1 where the inclusion is followed by implicit steps alone.
     [[nodiscard]] virtual Mode branch_modes() const noexcept = 0;
+    [[nodiscard]] bool has_branches() const noexcept { return branch_modes() > 1; }
 
     [[nodiscard]] static constexpr Branch branch(std::size_t i, Mode b) noexcept
     {
@@ -75,6 +84,8 @@ public:
     virtual void observe_rate(double t, const double* dxdt, double* rates) const = 0;
     /// The largest component that row i of E reads.
     [[nodiscard]] virtual double size_of_row(std::size_t i, const double* x) const = 0;
+    /// Whether the motion is that of a flow wherever no y is zero: for boxes of reactions.
+    [[nodiscard]] virtual bool decides_at_zero() const noexcept = 0;
     /// What a reaction alone does to the state that it acts on: it moves x by -y / W_ii along the
     /// reaction, so that y_i is zero. False where it has no influence on its y.
     [[nodiscard]] virtual bool move_onto(std::size_t i, double t, double* x) const = 0;
@@ -97,6 +108,9 @@ public:
     [[nodiscard]] virtual Mode start(double t, double* x) const = 0;
     /// See `AnyModes::arrive`.
     [[nodiscard]] virtual Mode arrive(Mode at, double t, double* x) const = 0;
+    /// See `AnyModes::mode_after`. @throws InclusionRefused also for a reaction outside its set
+    [[nodiscard]] virtual Mode resume(double t, double* x, const double* reaction,
+                                      double error) = 0;
     virtual void hold(Mode at, double t, double* x) const = 0;
     /// See `AnyModes::undetermined`; `no_reaction` where there is none.
     [[nodiscard]] virtual std::size_t undetermined(Mode at, double t, const double* x) const = 0;
@@ -122,6 +136,9 @@ public:
     [[nodiscard]] virtual bool stays_held(Mode b, double t, const double* x) const = 0;
     [[nodiscard]] virtual bool flows(Mode b) const noexcept = 0;
     virtual void flow(Mode b, double t, const double* x, double* dxdt) const = 0;
+    /// The reactions in branches b; at the end of the last implicit step.
+    virtual void reaction(Mode b, double t, const double* x, double* r) const = 0;
+    virtual void reaction_of_step(double* r) const = 0;
     /// y' of reaction i.
     [[nodiscard]] virtual double rate_of(std::size_t i, const double* dxdt) const = 0;
     /// The fraction of a step that would follow the held reactions; 1 if the step does, and
@@ -139,11 +156,10 @@ public:
     /// Length [s] of the next step, of at most h: up to the first change of branch.
     [[nodiscard]] virtual double reach(const ImplicitStart& from, double h) = 0;
     /// Takes a step. False where a stage has no solution; see `failure`.
-    [[nodiscard]] virtual bool take(const ImplicitStart& from, double h, double* x,
-                                    double* dxdt) = 0;
+    [[nodiscard]] virtual bool take(const ImplicitStart& from, double h,
+                                    const ImplicitEnd& end) = 0;
     /// A step of length s from the start of the current one, whose length is h.
-    virtual void take_to(const ImplicitStart& from, double h, double s, double* x,
-                         double* dxdt) = 0;
+    virtual void take_to(const ImplicitStart& from, double h, double s, const ImplicitEnd& end) = 0;
     /// Whether the step that was taken ends at a change of branch.
     [[nodiscard]] virtual bool ends_at_change() const noexcept = 0;
     /// The branches after that change. May move x onto a surface.

@@ -1,6 +1,6 @@
 // Internal: the declarations of this header may change without notice.
 //
-// `BranchPhases` for solvers of N components and M reactions.
+// `BranchPhases` of boxes of at most four reactions, in solvers of N components and M reactions.
 #pragma once
 
 #include <algorithm>
@@ -11,16 +11,15 @@
 #include <vector>
 
 #include "ricochet/detail/branch_modes.hpp"
-#include "ricochet/detail/branch_phases.hpp"
 #include "ricochet/detail/false_position.hpp"
 #include "ricochet/detail/held_reactions.hpp"
-#include "ricochet/detail/law.hpp"
-#include "ricochet/detail/minimal_selection.hpp"
+#include "ricochet/detail/implicit_phases.hpp"
 
 namespace ricochet::detail {
 
 template <int N, int M>
-class RICOCHET_ALIGNED BranchPhasesOf final : public BranchPhases {
+class RICOCHET_ALIGNED BranchPhasesOf final : public ImplicitPhases<N, M> {
+    using Base = ImplicitPhases<N, M>;
     using Modes = AnyModes<N, M>;
     using Vector = typename Modes::Vector;
     using Reaction = typename Modes::Reaction;
@@ -29,23 +28,15 @@ class RICOCHET_ALIGNED BranchPhasesOf final : public BranchPhases {
     using X = typename Modes::State;
 
 public:
+    using Base::reactions, Base::size;
+
     BranchPhasesOf(const AnyInclusion<N, M>& inclusion, const BranchPhasesOptions& options)
-        : options_(options), modes_(inclusion), step_(inclusion, options.scheme)
+        : Base(inclusion, options), modes_(inclusion)
     {
-        from_.w.setZero(N);
-        from_.reaction.setZero(M);
-        from_.t = std::numeric_limits<double>::lowest();
-        located_.end = to_ = probe_ = from_is_to_ = from_;
+        located_.end = to_;
+        located_.error = error_;
     }
 
-    [[nodiscard]] std::size_t size() const noexcept override
-    {
-        return static_cast<std::size_t>(matrices().own_size());
-    }
-    [[nodiscard]] std::size_t reactions() const noexcept override
-    {
-        return static_cast<std::size_t>(modes_.count());
-    }
     [[nodiscard]] Mode branch_modes() const noexcept override { return Modes::branch_modes; }
 
     // --- y and its reactions ---
@@ -53,73 +44,6 @@ public:
     void observe(double t, const double* x, double* y) const override
     {
         write(modes_.observed(t, vector(x)), y, reactions());
-    }
-    void observe_rate(double t, const double* dxdt, double* rates) const override
-    {
-        const auto& m = matrices();
-        Reaction rate = times(m.observe(), vector(dxdt));
-        m.subtract_offset_rate(t, rate);
-        write(rate, rates, reactions());
-    }
-    [[nodiscard]] double size_of_row(std::size_t i, const double* x) const override
-    {
-        double largest = 0;
-        for (std::size_t c = 0; c < size(); ++c) {
-            const bool reads = matrices().observe()(index(i), index(c)) != 0;
-            if (reads) largest = std::max(largest, std::abs(x[c]));
-        }
-        return largest;
-    }
-    [[nodiscard]] bool move_onto(std::size_t i, double t, double* x) const override
-    {
-        const auto& m = matrices();
-        const Vector lever = times(m.inverse_mass(), Vector(m.act().col(index(i))));
-        const double influence = modes_.rate_of(index(i), lever);
-        if (influence == 0) return false;
-        Vector w = vector(x);
-        w -= lever * (modes_.observed(t, w)[index(i)] / influence);
-        Reaction s;
-        m.offset(t, s);
-        m.hold(index(i), 0, s[index(i)], w);
-        write(w, x, size());
-        return true;
-    }
-    void shift(std::size_t i, double amount, double* x) const override
-    {
-        const auto& row = matrices().observe().row(index(i));
-        const double square = row.squaredNorm();
-        for (std::size_t c = 0; c < size(); ++c) x[c] += amount / square * row[index(c)];
-    }
-    bool bounds(double t, const double* x, double* lower, double* upper) const override
-    {
-        Reaction least, most;
-        const bool fine = matrices().inclusion().bounds(t, vector(x), least, most);
-        write(least, lower, reactions());
-        write(most, upper, reactions());
-        return fine;
-    }
-    [[nodiscard]] bool jumps(double t, const double* x) override
-    {
-        constexpr double part = 64 * std::numeric_limits<double>::epsilon();
-        const double before = std::nextafter(t, -std::numeric_limits<double>::infinity());
-        const Vector w = vector(x);
-        const auto differ = [](const auto& a, const auto& b) {
-            const double size = std::max(a.cwiseAbs().maxCoeff(), b.cwiseAbs().maxCoeff());
-            return !((a - b).cwiseAbs().maxCoeff() <= part * size);
-        };
-        Vector f0, f1;
-        matrices().smooth(before, w, f0);
-        matrices().smooth(t, w, f1);
-        if (differ(f0, f1)) return true;
-        Reaction a, b, c, d;
-        matrices().inclusion().bounds(before, w, a, b);
-        matrices().inclusion().bounds(t, w, c, d);
-        for (Eigen::Index i = 0; i < modes_.count(); ++i) {
-            if (a[i] != c[i] || b[i] != d[i]) return true;
-        }
-        matrices().offset(before, a);
-        matrices().offset(t, b);
-        return differ(a, b);
     }
 
     // --- entering ---
@@ -148,6 +72,20 @@ public:
         Vector w = vector(x);
         const Mode b = modes_.arrive(Modes::branches_of(at), t, w);
         write(w, x, size());
+        return b;
+    }
+    [[nodiscard]] Mode resume(double t, double* x, const double* reaction, double error) override
+    {
+        State end = from_;
+        end.t = t;
+        end.w = vector(x);
+        end.reaction.setZero();
+        for (std::size_t i = 0; i < reactions(); ++i) end.reaction[index(i)] = reaction[i];
+        check_start(matrices(), end.t, end.w);
+        check_reaction(matrices(), end);
+        to_ = end;
+        const Mode b = modes_.mode_after(end, error);
+        write(end.w, x, size());
         return b;
     }
     void hold(Mode at, double t, double* x) const override
@@ -216,7 +154,11 @@ public:
     {
         X rate;
         modes_.flow(b, t, array(x), rate);
-        std::copy_n(rate.data(), size(), dxdt);
+        Base::write_state(rate.data(), dxdt);
+    }
+    void reaction(Mode b, double t, const double* x, double* r) const override
+    {
+        write(modes_.reaction(b, t, vector(x)), r, reactions());
     }
     [[nodiscard]] double rate_of(std::size_t i, const double* dxdt) const override
     {
@@ -245,25 +187,6 @@ public:
 
     // --- implicit phases ---
 
-    [[nodiscard]] bool select(double t, const double* x, Mode& branches) override
-    {
-        probe_.t = t;
-        probe_.w = vector(x);
-        if (!select(probe_)) return false;
-        branches = branches_of(probe_);
-        return true;
-    }
-    void selected_rate(double t, const double* x, double* dxdt) override
-    {
-        probe_.t = t;
-        probe_.w = vector(x);
-        if (continues(t, x)) {
-            probe_.reaction = to_.reaction;
-        } else if (!select(probe_)) {
-            probe_.reaction.setConstant(std::numeric_limits<double>::quiet_NaN());
-        }
-        rate(probe_, dxdt);
-    }
     [[nodiscard]] double reach(const ImplicitStart& from, double h) override
     {
         located_.valid = false;
@@ -296,11 +219,12 @@ public:
         located_.length = high;
         located_.branches = from.branches;
         located_.w = from_.w;
+        step_.embedded_error(from_, high, located_.end, located_.error);
         return high;
     }
-    [[nodiscard]] bool take(const ImplicitStart& from, double h, double* x, double* dxdt) override
+    [[nodiscard]] bool take(const ImplicitStart& from, double h, const ImplicitEnd& end) override
     {
-        ++attempts_;
+        ++this->attempts_;
         place(from);
         from_is_to_ = from_;
         bool stays = stays_in_branches(from, h);
@@ -308,34 +232,32 @@ public:
         const Branches b = Modes::branches_of(from.branches);
         if (to_end) {
             to_ = located_.end;
+            error_ = located_.error;
         } else if (stays) {
             // A y that has returned by the end of the step that was looked at may be away here.
             stays = solve(h, to_, &b) && step_.slack(to_, b) >= 0;
             located_.valid = stays;
         }
         if (!stays && !solve(h, to_, nullptr)) return false;
+        if (!to_end) step_.embedded_error(from_, h, to_, error_);
         change_ = to_end && located_.change;
         crossed_ = !stays && !from.crosses;
         if (crossed_) {  // a change that was not located shows at the end
             next_ = branches_of(to_);
             change_ = next_ != from.branches;
         }
-        write(to_.w, x, size());
-        rate(to_, dxdt);
+        put(end);
         return true;
     }
-    void take_to(const ImplicitStart& from, double h, double s, double* x, double* dxdt) override
+    void take_to(const ImplicitStart& from, double h, double s, const ImplicitEnd& end) override
     {
         place(from);
         const Branches b = Modes::branches_of(from.branches);
         // Held reactions that depend on one another are not always determined in their branches.
         const bool stays = stays_in_branches(from, h) && solve(s, probe_, &b);
-        if (!stays && !solve(s, probe_, nullptr)) {
-            probe_.w.setConstant(std::numeric_limits<double>::quiet_NaN());
-            probe_.reaction.setZero(M);
-        }
-        write(probe_.w, x, size());
-        rate(probe_, dxdt);
+        if (!stays && !solve(s, probe_, nullptr)) Base::give_up(probe_);
+        write(probe_.w, end.x, size());
+        Base::rate(probe_, end.dxdt);
     }
     [[nodiscard]] bool ends_at_change() const noexcept override { return change_; }
     [[nodiscard]] Mode change(Mode b, double t, double* x) override
@@ -343,7 +265,7 @@ public:
         change_ = false;
         if (crossed_) {
             for (std::size_t i = 0; i < reactions(); ++i) {
-                if (branch(i, next_) != branch(i, b)) changed_ = i;
+                if (Base::branch(i, next_) != Base::branch(i, b)) changed_ = i;
             }
             return next_;
         }
@@ -362,54 +284,36 @@ public:
         }
         return arrive_at(which, t, x);
     }
-    [[nodiscard]] Mode branches_at_end() override { return branches_of(to_); }
     [[nodiscard]] std::size_t changed() const noexcept override { return changed_; }
-    [[nodiscard]] double law() const override
-    {
-        return law_violation(matrices(), to_.t, to_.w, to_.reaction, options_.step);
-    }
-    [[nodiscard]] const StageReport& failure() const noexcept override { return failure_; }
     void note_faulty(double t, const double* x) override
     {
-        failure_.converged = false;
-        failure_.set = modes_.faulty(t, vector(x));
+        Base::note_faulty(t, x);
+        this->failure_.set = modes_.faulty(t, vector(x));
     }
-    [[nodiscard]] std::uint64_t attempts() const noexcept override { return attempts_; }
-    [[nodiscard]] std::uint64_t stages() const noexcept override { return stages_; }
 
     // --- memory ---
 
     void save(std::vector<double>& memory) const override
     {
-        const auto add = [&](const auto& v) {
-            memory.insert(memory.end(), v.data(), v.data() + v.size());
-        };
-        memory.insert(memory.end(), {to_.t, held_end_.t, held_end_.h,
+        memory.insert(memory.end(), {held_end_.t, held_end_.h,
                                      static_cast<double>(held_end_.branches), held_.worst()});
-        add(to_.w);
-        add(to_.reaction);
-        add(held_end_.w);
+        Base::add(memory, held_end_.w);
+        Base::save(memory);
     }
     void restore(std::span<const double> memory) override
     {
-        std::size_t next = 0;
-        const auto read = [&](auto& v) {
-            for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = memory[next++];
-        };
-        to_.t = memory[next++];
-        held_end_.t = memory[next++];
-        held_end_.h = memory[next++];
-        held_end_.branches = static_cast<Mode>(memory[next++]);
-        const double worst = memory[next++];
-        read(to_.w);
-        read(to_.reaction);
-        read(held_end_.w);
+        held_end_.t = memory[0];
+        held_end_.h = memory[1];
+        held_end_.branches = static_cast<Mode>(memory[2]);
+        const double worst = memory[3];
+        std::size_t next = 4;
+        Base::read(memory, next, held_end_.w);
+        Base::restore(memory.subspan(next));
         held_.forget();
         if (held_end_.h > 0) {
             held_.resume(modes_, held_end_.branches, held_end_.t, held_end_.w, held_end_.h, worst);
         }
         located_.valid = change_ = false;
-        from_is_to_.t = std::numeric_limits<double>::quiet_NaN();
     }
 
 private:
@@ -420,6 +324,7 @@ private:
         Mode branches = 0;
         Vector w;
         State end;
+        Vector error;
     };
     struct HeldEnd {
         double t = 0, h = 0;
@@ -427,39 +332,28 @@ private:
         Vector w = Vector::Zero(N);
     };
 
-    [[nodiscard]] const AnyMatrices<N, M>& matrices() const noexcept { return modes_.matrices(); }
-    [[nodiscard]] static Eigen::Index index(std::size_t i) noexcept
-    {
-        return static_cast<Eigen::Index>(i);
-    }
+    using Base::error_, Base::from_, Base::from_is_to_, Base::options_, Base::probe_, Base::step_,
+        Base::to_;
+    using Base::index, Base::matrices, Base::place, Base::put, Base::solve, Base::vector,
+        Base::write;
+
     [[nodiscard]] static constexpr std::size_t of_modes(std::size_t which) noexcept
     {
-        const std::size_t i = which / guards_of_reaction, kind = which % guards_of_reaction;
+        const std::size_t i = which / Base::guards_of_reaction,
+                          kind = which % Base::guards_of_reaction;
         return kind < 4 ? 4 * i + kind : Modes::first_set_guard + i;
     }
     void spread(const std::array<double, Modes::guard_count>& all, double* g) const
     {
-        const std::size_t count = guards_of_reaction * reactions();
+        const std::size_t count = Base::guards_of_reaction * reactions();
         for (std::size_t k = 0; k < count; ++k) g[k] = all[of_modes(k)];
     }
 
-    // Components behind those of the system are zero.
-    [[nodiscard]] Vector vector(const double* x) const
-    {
-        Vector w = Vector::Zero(N);
-        for (std::size_t i = 0; i < size(); ++i) w[index(i)] = x[i];
-        return w;
-    }
     [[nodiscard]] X array(const double* x) const
     {
-        X out{};
-        std::copy_n(x, size(), out.data());
+        X out;
+        Base::read_state(x, out.data());
         return out;
-    }
-    template <class V>
-    static void write(const V& v, double* x, std::size_t count)
-    {
-        for (std::size_t i = 0; i < count; ++i) x[i] = v[index(i)];
     }
 
     /// Whether the reactions that are beyond their bounds at the end of a step, which leaves the
@@ -476,16 +370,7 @@ private:
         return true;
     }
 
-    [[nodiscard]] bool select(State& at) const
-    {
-        try {
-            at.reaction = minimal_selection(matrices(), at.t, at.w);
-        } catch (const InclusionRefused&) {
-            return false;
-        }
-        return true;
-    }
-    [[nodiscard]] Mode branches_of(const State& at)
+    [[nodiscard]] Mode branches_of(const State& at) override
     {
         Branches b;
         b.setConstant(M, Branch::lower);
@@ -494,63 +379,11 @@ private:
         return Modes::mode_of(b);
     }
 
-    /// Whether (t, x) is the end of the last step, up to the rounding with which it is accepted.
-    [[nodiscard]] bool continues(double t, const double* x) const
-    {
-        constexpr double ulps = 8 * std::numeric_limits<double>::epsilon();
-        if (!(std::abs(t - to_.t) <= ulps * std::abs(t))) return false;
-        for (std::size_t i = 0; i < size(); ++i) {
-            const double there = to_.w[index(i)];
-            if (!(std::abs(x[i] - there) <= ulps * std::abs(there))) return false;
-        }
-        return true;
-    }
-    /// Sets the start of a step, with the reaction of the step before; after anything else that of
-    /// the minimal selection.
-    void place(const ImplicitStart& from)
-    {
-        from_.t = from.t;
-        from_.w = vector(from.x);
-        if (continues(from.t, from.x)) {
-            from_.reaction = to_.reaction;
-        } else if (from_is_to_.t == from.t && from_is_to_.w == from_.w) {
-            from_.reaction = from_is_to_.reaction;  // another attempt
-        } else if (!select(from_)) {
-            from_.reaction.setZero(M);
-        }
-    }
     /// Whether a step of length h from here ends no later than the first change, as `reach` found.
     [[nodiscard]] bool stays_in_branches(const ImplicitStart& from, double h) const
     {
         return located_.valid && h <= located_.length && located_.t == from.t &&
                located_.branches == from.branches && located_.w == from_.w;
-    }
-    [[nodiscard]] bool solve(double h, State& to, const Branches* frozen)
-    {
-        stages_ += 2;
-        const StageReport report = step_.take(from_, h, to, frozen);
-        if (!report.converged) failure_ = report;
-        return report.converged;
-    }
-
-    /// w' = A^-1 (f + G r), where a held component follows its surface exactly.
-    void rate(const State& at, double* dxdt)
-    {
-        const auto& m = matrices();
-        Vector f;
-        m.smooth(at.t, at.w, f);
-        const Vector rate = times(m.inverse_mass(), Vector(f + times(m.act(), at.reaction)));
-        write(rate, dxdt, size());
-        if (m.traits().moves && !m.traits().gives_offset_rate) return;
-        Reaction lower, upper, still = Reaction::Zero(M);
-        m.inclusion().bounds(at.t, at.w, lower, upper);
-        const Reaction y = modes_.observed(at.t, at.w);
-        if (m.traits().gives_offset_rate) m.inclusion().offset_rate(at.t, still);
-        for (Eigen::Index i = 0; i < modes_.count(); ++i) {
-            const bool inside = at.reaction[i] > lower[i] && at.reaction[i] < upper[i];
-            if (m.selected(i) < 0 || y[i] != 0 || !inside) continue;
-            dxdt[m.selected(i)] = still[i];
-        }
     }
 
     /// Reaction `which` has stopped to slide: it sticks, or slides on in the other direction.
@@ -568,27 +401,20 @@ private:
         write(w, x, size());
         to_.t = t;
         to_.w = w;
-        (void)select(to_);  // else the solver's reaction is kept
+        (void)Base::select(to_);  // else the solver's reaction is kept
         return branches_of(to_);
     }
 
-    BranchPhasesOptions options_;
     Modes modes_;
-    AnyStep<N, M> step_;
     HeldReactions<N, M> held_;
     HeldEnd held_end_;
-    State from_, to_, probe_;
-    State from_is_to_;  ///< start of the last step
     Located located_;
     bool change_ = false;
     bool crossed_ = false;  ///< the change lies somewhere in the step
     Mode next_ = 0;         ///< branches after it
     std::size_t changed_ = 0;
-    std::uint64_t attempts_ = 0, stages_ = 0;
-    StageReport failure_;
 };
 
-/// Null where the inclusion has no modes of branches.
 template <int N, int M>
 Owner<BranchPhases> make_branch_phases(const AnyInclusion<N, M>& inclusion,
                                        const BranchPhasesOptions& options)
@@ -599,7 +425,7 @@ Owner<BranchPhases> make_branch_phases(const AnyInclusion<N, M>& inclusion,
             return Owner<BranchPhases>(new BranchPhasesOf<N, M>(inclusion, options));
         }
     }
-    return {};
+    return Owner<BranchPhases>(new ImplicitPhases<N, M>(inclusion, options));
 }
 
 }  // namespace ricochet::detail

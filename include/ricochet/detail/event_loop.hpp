@@ -1,34 +1,38 @@
 // Internal: the declarations of this header may change without notice.
 //
-// The event-driven phases of a hand-over: a simulation of the branches, whatever its stepper.
+// Flights of a contact motion: a simulation, whatever its system and stepper.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <optional>
 
-#include "ricochet/detail/branch_modes.hpp"
-#include "ricochet/detail/hand_over_run.hpp"
 #include "ricochet/integrate/simulation.hpp"
 
 namespace ricochet::detail {
 
-/// Options of the event-driven phase that begins at t, after `samples` samples and `steps` steps.
-[[nodiscard]] Options event_options(const HandOverOptions& options, double t, std::size_t samples,
-                                    std::uint64_t steps);
+/// Whether events follow each other so closely that locating them does not pay: 200 of them
+/// within `span` [s].
+class ChatterWatch {
+public:
+    ChatterWatch(double t, double span) noexcept : marked_(t), span_(span) {}
 
-/// Cause of the set-valued phase after an event-driven one with this outcome; nothing if
-/// the run is over.
-[[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;
+    /// Called at time t, after `events` events of the phase.
+    [[nodiscard]] bool operator()(double t, std::uint64_t events) noexcept
+    {
+        if (events < mark_ + most_events) return false;
+        const bool chatters = t - marked_ < span_;
+        mark_ = events;
+        marked_ = t;
+        return chatters;
+    }
 
-/// The options with defaults filled in.
-/// @throws std::invalid_argument naming the option.
-[[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
-
-void add(Statistics& sum, const Statistics& more) noexcept;
-void add(SetValuedStatistics& sum, const SetValuedStatistics& more) noexcept;
+private:
+    static constexpr std::uint64_t most_events = 200;
+    double marked_;
+    double span_;
+    std::uint64_t mark_ = 0;
+};
 
 /// A simulation with N components, for systems and steppers of any type.
 template <int N>
@@ -82,48 +86,5 @@ private:
 
     Simulation<System, X, Stepping> simulation_;
 };
-
-/// Factory of loops with one stepper.
-template <int N, int M>
-struct EventStepping {
-    std::unique_ptr<EventLoop<N>> (*make)(const AnyModes<N, M>& modes,
-                                          const std::array<double, static_cast<std::size_t>(N)>& x,
-                                          const Options& options) = nullptr;
-    bool error_controlled = true;
-};
-
-template <int N, int M, class Stepping>
-std::unique_ptr<EventLoop<N>> make_event_loop(
-    const AnyModes<N, M>& modes, const std::array<double, static_cast<std::size_t>(N)>& x,
-    const Options& options)
-{
-    return std::make_unique<EventLoopBy<N, AnyModes<N, M>, Stepping>>(modes, x, options);
-}
-
-// Defined where solvers are compiled (nonsmooth/solvers.hpp).
-
-/// The same with Dormand and Prince's method; null where there are no modes.
-template <int N, int M>
-[[nodiscard]] std::unique_ptr<EventLoop<N>> make_dopri5_loop(
-    const AnyModes<N, M>& modes, const std::array<double, static_cast<std::size_t>(N)>& x,
-    const Options& options);
-
-// The loop of a hand-over (any_hand_over.hpp), and what makes and runs it.
-
-template <int N, int M>
-class RICOCHET_ALIGNED AnyHandOver;
-
-template <int N, int M>
-[[nodiscard]] std::shared_ptr<AnyHandOver<N, M>> make_hand_over(
-    const AnyInclusion<N, M>& inclusion, const Eigen::Matrix<double, N, 1>& w0,
-    const HandOverOptions& options, const EventStepping<N, M>& stepping);
-
-template <int N, int M>
-[[nodiscard]] std::shared_ptr<AnyHandOver<N, M>> make_hand_over(
-    const AnyInclusion<N, M>& inclusion, const StateWithReaction<N, M>& start,
-    const HandOverOptions& options, const EventStepping<N, M>& stepping);
-
-template <int N, int M>
-[[nodiscard]] AnyHandOverRun<N, M> take_run(AnyHandOver<N, M>& hand_over);
 
 }  // namespace ricochet::detail

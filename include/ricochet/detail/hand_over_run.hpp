@@ -6,6 +6,7 @@
 #include <atomic>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string_view>
 #include <vector>
 
@@ -79,27 +80,19 @@ struct HandOverStatistics {
     double set_valued_time = 0;  ///< [s] duration of the set-valued motion
 };
 
-namespace detail {
-
-template <int N, int M>
-struct RICOCHET_ALIGNED AnyHandOverRun {
-    using Vector = Eigen::Matrix<double, N, 1>;
+/// `Event::guard` is the reaction that changed; modes are those of `BranchModes`.
+template <Inclusion System>
+struct RICOCHET_ALIGNED HandOverRun {
+    using Vector = StateOf<System>;
 
     Outcome outcome = Outcome::reached_end;
-    StateWithReaction<N, M> state;  ///< at the time reached, with its reaction
-    Mode mode = 0;                  ///< `BranchModes::several` in a set-valued phase
+    SetValuedState<System> state;  ///< at the time reached, with its reaction
+    Mode mode = 0;                 ///< `BranchModes::several` in a set-valued phase
     std::vector<Event<Vector>> events;
     std::vector<Phase> phases;
     Trajectory<Vector> trajectory;  ///< at the sample times
     HandOverStatistics statistics;
     StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
-};
-
-}  // namespace detail
-
-/// `Event::guard` is the reaction that changed; modes are those of `BranchModes`.
-template <Inclusion System>
-struct HandOverRun : detail::AnyHandOverRun<state_size<System>, reaction_size<System>> {
 };
 
 /// Converts the options of `integrate`.
@@ -112,6 +105,17 @@ namespace detail {
 /// The same for a run in phases of one loop, which has stop_at_event, record_steps and tolerances
 /// of components.
 [[nodiscard]] HandOverOptions options_of_phases(const Options& options);
+
+/// The options with defaults filled in.
+/// @throws std::invalid_argument naming the option.
+[[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
+void add(Statistics& sum, const Statistics& more) noexcept;
+/// Options of an event-driven phase that begins at t, after `samples` samples and `steps` steps.
+[[nodiscard]] Options event_options(const HandOverOptions& options, double t, std::size_t samples,
+                                    std::uint64_t steps);
+/// Cause of the set-valued phase after an event-driven one with this outcome; nothing if the run is
+/// over.
+[[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;
 
 /// The same for a run of an inclusion alone.
 /// @throws std::invalid_argument also for options that it does not use

@@ -11,6 +11,7 @@
 #include <type_traits>
 
 #include "ricochet/detail/declarations.hpp"
+#include "ricochet/detail/linear_cases.hpp"
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
 

@@ -27,38 +27,14 @@
     template Eigen::Matrix<double, M, 1> ricochet::minimal_selection<N, M>( \
         const ricochet::detail::AnyMatrices<N, M>&, double, const Eigen::Matrix<double, N, 1>&);
 
-/// The hand-over, without its event-driven phases.
+/// The phases of a run.
 #define RICOCHET_HAND_OVER_OF(N, M)                                                            \
     template double ricochet::law_violation<N, M>(const ricochet::detail::AnyMatrices<N, M>&,  \
                                                   double, const Eigen::Matrix<double, N, 1>&,  \
                                                   const Eigen::Matrix<double, M, 1>&, double); \
-    template std::shared_ptr<ricochet::detail::AnyHandOver<N, M>>                              \
-    ricochet::detail::make_hand_over<N, M>(                                                    \
-        const ricochet::detail::AnyInclusion<N, M>&, const Eigen::Matrix<double, N, 1>&,       \
-        const ricochet::HandOverOptions&, const ricochet::detail::EventStepping<N, M>&);       \
-    template std::shared_ptr<ricochet::detail::AnyHandOver<N, M>>                              \
-    ricochet::detail::make_hand_over<N, M>(const ricochet::detail::AnyInclusion<N, M>&,        \
-                                           const ricochet::detail::StateWithReaction<N, M>&,   \
-                                           const ricochet::HandOverOptions&,                   \
-                                           const ricochet::detail::EventStepping<N, M>&);      \
-    template ricochet::detail::AnyHandOverRun<N, M> ricochet::detail::take_run<N, M>(          \
-        ricochet::detail::AnyHandOver<N, M>&);                                                 \
     template ricochet::detail::Owner<ricochet::detail::BranchPhases>                           \
     ricochet::detail::make_branch_phases<N, M>(const ricochet::detail::AnyInclusion<N, M>&,    \
                                                const ricochet::detail::BranchPhasesOptions&);
-
-/// The simulation of the modes of at most four reactions, by Dormand and Prince's method, or by
-/// another one with error control.
-#define RICOCHET_DOPRI5_OF(N, M)                                                        \
-    template std::unique_ptr<ricochet::detail::EventLoop<N>>                            \
-    ricochet::detail::make_dopri5_loop<N, M>(const ricochet::detail::AnyModes<N, M>&,   \
-                                             const std::array<double, std::size_t(N)>&, \
-                                             const ricochet::Options&);
-#define RICOCHET_EVENTS_OF(N, M, Method, how)                                               \
-    how template std::unique_ptr<ricochet::detail::EventLoop<N>>                            \
-    ricochet::detail::make_event_loop<N, M, ricochet::ErrorControlled<ricochet::Method>>(   \
-        const ricochet::detail::AnyModes<N, M>&, const std::array<double, std::size_t(N)>&, \
-        const ricochet::Options&);
 
 /// Runs systems of N components and M reactions in solvers of exactly this size. With `extern` as
 /// its third argument it says that they are compiled elsewhere; with nothing it compiles them, and
@@ -67,9 +43,8 @@
 #define RICOCHET_INCLUSIONS_OF_extern(N, M) \
     template <>                             \
     struct ricochet::detail::CompiledExactly<N, M>;
-#define RICOCHET_INCLUSIONS_OF_(N, M)                                                            \
-    RICOCHET_INCLUSIONS_OF_extern(N, M) RICOCHET_SET_VALUED_OF(N, M) RICOCHET_HAND_OVER_OF(N, M) \
-        RICOCHET_DOPRI5_OF(N, M)
+#define RICOCHET_INCLUSIONS_OF_(N, M) \
+    RICOCHET_INCLUSIONS_OF_extern(N, M) RICOCHET_SET_VALUED_OF(N, M) RICOCHET_HAND_OVER_OF(N, M)
 
 /// Time stepping of N coordinates, and the hand-over from flight by one method.
 #define RICOCHET_TIME_STEPPING_OF(N, how) how template class ricochet::detail::AnyTimeStepping<N>;

@@ -15,9 +15,9 @@ namespace ricochet {
 /// The largest violation of "reaction in K and -y in the normal cone of K at the reaction" at
 /// (t, w), as a fraction of the forces: 0 where the law holds, and of the order of 1 where a
 /// reaction acts at the wrong bound. A y counts as zero below 1e-9 of its terms and of the change
-/// that the forces cause in `span` [s], such as a step. For boxes each component is taken by
-/// itself; infinite where a set is empty. For a set of states it is 0, since the law is then the
-/// solver's residual.
+/// that the forces, and reactions at the nearer of their bounds, cause in `span` [s], such as a
+/// step. For boxes each component is taken by itself; infinite where a set is empty. For a set of
+/// states it is 0, since the law is then the solver's residual.
 template <int N, int M>
 [[nodiscard]] double law_violation(
     const detail::AnyMatrices<N, M>& m, double t,
@@ -36,21 +36,27 @@ template <int N, int M>
     const double force = lever > 0 ? f.template lpNorm<Eigen::Infinity>() / lever : 0;
     const double scale = std::max(
         {reaction.template lpNorm<Eigen::Infinity>(), force, std::numeric_limits<double>::min()});
-    f = f.cwiseAbs().eval() + detail::times(m.act().cwiseAbs(), reaction.cwiseAbs());
+    Reaction lower = y, upper = y, most = reaction.cwiseAbs();
+    if (m.traits().box) {
+        if (!inclusion.bounds(t, w, lower, upper)) return std::numeric_limits<double>::infinity();
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            const double nearer = std::min(std::abs(lower[i]), std::abs(upper[i]));
+            if (std::isfinite(nearer)) most[i] = std::max(most[i], nearer);
+        }
+    }
+    f = f.cwiseAbs().eval() + detail::times(m.act().cwiseAbs(), most);
     f = w.cwiseAbs() + span * detail::times(m.inverse_mass().cwiseAbs(), f).eval();
     size = 1e-9 * (detail::times(m.observe().cwiseAbs(), f) + size.cwiseAbs());
     double worst = 0;
     if (m.traits().box) {
-        Reaction lower = y, upper = y;
-        if (!inclusion.bounds(t, w, lower, upper)) return std::numeric_limits<double>::infinity();
         for (Eigen::Index i = 0; i < y.size(); ++i) {
             const double r = reaction[i];
             const double nearest = y[i] > size[i]    ? lower[i]
                                    : y[i] < -size[i] ? upper[i]
                                                      : std::clamp(r, lower[i], upper[i]);
             if (r == nearest) continue;
-            const double most = std::max(scale, std::abs(nearest));
-            worst = std::max(worst, std::isinf(nearest) ? 1 : std::abs(r - nearest) / most);
+            const double unit = std::max(scale, std::abs(nearest));
+            worst = std::max(worst, std::isinf(nearest) ? 1 : std::abs(r - nearest) / unit);
         }
     } else {
         for (Eigen::Index i = 0; i < y.size(); ++i) {

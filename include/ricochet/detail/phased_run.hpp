@@ -4,6 +4,7 @@
 // with set_valued() is made of. Compiled in ricochet::nonsmooth (src/nonsmooth/phased_system.hpp).
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -18,6 +19,25 @@ namespace ricochet::detail {
 /// Number of modes of which each may have an inclusion of its own.
 inline constexpr std::size_t most_inclusions = 4096;
 
+/// What a run of an inclusion alone has besides its options.
+struct AloneOptions {
+    double step = 0;                 ///< [s] of implicit steps
+    bool events_only = false;        ///< it ends where those would begin
+    bool until_released = false;     ///< see `HandOverOptions`
+    std::uint64_t stall_steps = 0;   ///< likewise
+    std::vector<double> reaction{};  ///< of the earlier run from whose end it goes on
+};
+/// Branch modes before and after an event.
+struct BranchChange {
+    Mode before, after;
+};
+/// How a run of an inclusion alone has ended.
+struct EndInBranches {
+    Mode mode;                          ///< `several` in a phase of implicit steps
+    std::vector<double> reaction;       ///< there
+    std::vector<BranchChange> changes;  ///< one for each event
+};
+
 /// What a run with phases consists of, besides its start and its options.
 template <class C>
 struct PhasedSetup {
@@ -25,6 +45,7 @@ struct PhasedSetup {
     /// One for each mode, or null; or one for all modes.
     std::vector<Owner<BranchPhases>> inclusions;
     bool by_mode = false;
+    std::optional<AloneOptions> alone{};     ///< there is no flow but that of the inclusion
     MethodName method = MethodName::dopri5;  ///< of the explicit phases
     /// The mode in which a system continues by itself from (t, x); null if its mode stays.
     Mode (*start_mode)(void* door, Mode mode, double t, const C& x) = nullptr;
@@ -47,11 +68,16 @@ public:
     /// The counts of the run, by the kind of phase.
     [[nodiscard]] virtual HandOverStatistics statistics(const Run<C>& run) const = 0;
     [[nodiscard]] virtual const StageReport& failure() const noexcept = 0;
+    /// Of an inclusion alone, after the end.
+    [[nodiscard]] virtual EndInBranches end_in_branches() const = 0;
 };
 
 /// What solves the inclusion of a run with these options.
 /// @throws std::invalid_argument for options that a run with phases does not have.
 [[nodiscard]] BranchPhasesOptions branch_options(const Options& options);
+[[nodiscard]] BranchPhasesOptions branch_options(const HandOverOptions& completed);
+/// Options of the loop for those of an inclusion alone.
+[[nodiscard]] Options options_of_branches(const HandOverOptions& completed);
 
 /// @throws std::invalid_argument for options that a run with phases does not have, and for a start
 /// from which no reaction follows.

@@ -147,9 +147,10 @@ struct StepKernel {
     /// The departure after a step of length s, with its rate where the method computes it; the
     /// current step is unchanged.
     void (*depart)(void* door, StepState<X>& step, double s, X& w, X& rate) = nullptr;
-    /// The length of the step from here that meets the tolerance; then `attempt` with at most that
-    /// length returns 0. Null where a length is known to be right only afterwards.
-    double (*reach)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
+    /// How far a step from here may go, of which a length h is asked for: up to a change that the
+    /// stepper locates, or as far as the tolerance is met for certain. Null where that is known
+    /// only afterwards.
+    double (*reach)(void* door, StepState<X>& step, double h, double rtol, double atol) = nullptr;
     /// Whether the current step ends at a change that the stepper has located by itself. Null where
     /// it locates none.
     bool (*ends_at_change)(void* door, const StepState<X>& step) = nullptr;

@@ -107,7 +107,7 @@ class TaylorKernel {
         return reach.h;
     }
 
-    static double reach(void* door, State& state, double rtol, double atol)
+    static double reach(void* door, State& state, double /*h*/, double rtol, double atol)
     {
         const int order = taylor_order(at(door).given_order, rtol);
         TStep& step = expand(door, state, order);
@@ -153,7 +153,7 @@ class TaylorKernel {
         const int order = taylor_order(at(door).given_order, rtol);
         const TStep& step = expand(door, state, order);
         double longest = step.reach;
-        if (!(longest >= 0)) longest = reach(door, state, rtol, atol);
+        if (!(longest >= 0)) longest = reach(door, state, h, rtol, atol);
         if (!go(at(door), state, h)) return std::numeric_limits<double>::quiet_NaN();
         // A step may be longer by millionths, to reach the end of a run.
         const double excess = h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, step.order);

@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/detail/event_loop.hpp"
 #include "ricochet/detail/free_flight.hpp"
 #include "ricochet/detail/refusals.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"

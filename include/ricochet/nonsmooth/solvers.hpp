@@ -7,7 +7,6 @@
 
 #include <memory>
 
-#include "ricochet/detail/any_hand_over.hpp"
 #include "ricochet/detail/branch_phases_of.hpp"
 #include "ricochet/detail/debug_checks.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
@@ -231,18 +230,6 @@ Outcome AnyMotion<N, M>::advance()
         if (!(h_ >= h_min_)) {
             return end_with(solved ? Outcome::step_underflow : Outcome::not_converged);
         }
-    }
-}
-
-template <int N, int M>
-std::unique_ptr<EventLoop<N>> make_dopri5_loop(
-    const AnyModes<N, M>& modes, const std::array<double, static_cast<std::size_t>(N)>& x,
-    const Options& options)
-{
-    if constexpr (has_modes<N, M>) {
-        return make_event_loop<N, M, ErrorControlled<Dopri5>>(modes, x, options);
-    } else {
-        return nullptr;
     }
 }
 
