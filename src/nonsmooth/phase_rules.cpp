@@ -751,8 +751,7 @@ PhaseRules::Verdict PhaseRules::give_up(const End& end, double* x)
     kind_ = end.kind;
     reason_.clear();
     if (is_implicit(end.kind)) {
-        const bool unsolved =
-            end.outcome == Outcome::non_finite || end.outcome == Outcome::step_underflow;
+        const bool unsolved = end.outcome == Outcome::non_finite;
         if (!unsolved || end.which != no_guard || !end.of_phases) return {};
         return {PhaseVerdict::Kind::ends, end.kind, 0, Outcome::not_converged};
     }

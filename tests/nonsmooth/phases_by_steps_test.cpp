@@ -200,6 +200,16 @@ TEST(PhasesBySteps, AStopHoldsAStateUntilItsLoadTurns)
     expect_end(run, Saturated::State{0.5}, of_steps);
 }
 
+TEST(PhasesBySteps, ALeastStepThatIsTooLongForTheToleranceEndsTheRun)
+{
+    // Where the body slips its acceleration has a kink: 1e-3 s across it leave an error of some
+    // 1e-8.
+    Options options = until(6);
+    options.h_min = 1e-3;
+    const auto run = integrate(Plane{}, Plane::State{0, 0, 1.125, 0}, options);
+    EXPECT_EQ(run.outcome, Outcome::step_underflow);
+}
+
 // --- fixed steps ---
 
 /// A block that slides, and beside it a ball with this restitution.
