@@ -252,6 +252,53 @@ static void keeps_what_a_rest_holds_while_the_rest_moves(void)
     CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
 }
 
+/* --- a cart (x, v) that stands at 0, and a clock that pushes it outward once a second --- */
+
+static int cart_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+{
+    (void)user, (void)mode, (void)t, (void)n;
+    dxdt[0] = x[1];
+    dxdt[1] = 0;
+    dxdt[2] = 1;
+    return 0;
+}
+static int place_and_clock(void* user, size_t which, rc_mode mode, double t, const double* x,
+                           size_t n, double* g)
+{
+    (void)user, (void)mode, (void)t, (void)n;
+    *g = which == 0 ? x[0] : 1 - x[2];
+    return 0;
+}
+static int stop_or_push(void* user, size_t which, rc_mode* mode, double t, double* x, size_t n)
+{
+    (void)user, (void)mode, (void)t, (void)n;
+    x[1] = which == 0 ? 0 : -1;
+    if (which == 1) x[2] = 0;
+    return 0;
+}
+
+static void gives_a_standing_guard_its_event_where_another_moves_it(void)
+{
+    const double start[3] = {0, 0, 0};
+    rc_callbacks callbacks;
+    rc_monitor* monitor;
+    struct host host;
+    struct met met = {0};
+    memset(&callbacks, 0, sizeof callbacks);
+    callbacks.size = sizeof callbacks;
+    callbacks.dimension = 3;
+    callbacks.guard_count = 2;
+    callbacks.flow = cart_flow;
+    callbacks.guard = place_and_clock;
+    callbacks.reset = stop_or_push;
+    monitor = monitor_of(&callbacks, NULL);
+    CHECK(host_start(&host, monitor, &callbacks, 0, start, 0.1) == RC_STANDS);
+    CHECK(host_run(&host, monitor, RC_STANDS, 3.5, 0.1, &met) == RC_STANDS);
+    CHECK(host.x[0] == 0 && host.x[1] == 0);
+    CHECK(met.cuts >= 3 && fabs(met.t[met.cuts - 1] - 3) < 1e-13);
+    CHECK_STATUS(RC_OK, rc_monitor_free(monitor));
+}
+
 /* --- modes, recorded events, hosts with resets of their own --- */
 
 static int heat(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
@@ -943,6 +990,7 @@ int main(void)
     finds_simultaneous_impacts_in_sets();
     comes_to_rest_and_is_held_until_a_time_event();
     keeps_what_a_rest_holds_while_the_rest_moves();
+    gives_a_standing_guard_its_event_where_another_moves_it();
     switches_between_modes();
     lets_a_host_make_the_state_itself();
     asks_the_flow_where_a_host_gives_no_rate();

@@ -223,3 +223,39 @@ def test_a_run_says_which_function_was_not_finite(flow, value, reset, reason):
     run = ricochet.integrate(system, [1.0], 2.0, method="rk4", fixed=True, step=0.1)
     assert run.outcome == "non_finite" and run.reason == reason
     assert run.message.startswith(reason)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_function_is_called_in_a_mode_that_has_been_left(method):
+    left, late = [False], []
+
+    def flow(mode, t, x):
+        if mode == 0 and left[0]:
+            late.append(("flow", t))
+        return [x[1], -1 + 0.1 * math.sin(t) if mode == 0 else 0.5]
+
+    def height(mode, t, x):
+        if mode == 0 and left[0]:
+            late.append(("guard", t))
+        return x[0] if mode == 0 else 1.0
+
+    def reset(mode, t, x):
+        left[0] = True
+        return 1, [0.0, 0.0]
+
+    system = ricochet.System(flow, [ricochet.Guard(height, reset=reset)], modes=2)
+    run = ricochet.integrate(system, [1.0, 0.0], 4.0, method=method, sample_times=np.arange(0, 4, 0.1),
+                             record_steps=True)
+    assert run.mode == 1 and len(run.events) == 1 and late == []
+
+
+@pytest.mark.parametrize("step", [0.11, 0.17, 0.23, 0.29])
+def test_a_window_is_held_by_one_step_wherever_the_steps_end(step):
+    system = ricochet.System(
+        lambda t, x: [0.0, 0.0],
+        [ricochet.Guard(lambda t, x: (t - 1) * (t - 1.05), reset=lambda t, x: [x[0] + 1, x[1]]),
+         ricochet.Guard(lambda t, x: 1.08 - t, reset=lambda t, x: [x[0], x[1] + 1])])
+    for options in ({"method": "rk4", "fixed": True}, {"h_max": step}):
+        run = ricochet.integrate(system, [0.0, 0.0], 2.0, event_window=0.1, step=step, **options)
+        assert list(run.x) == [1, 1] and len(run.events) == 2
+        np.testing.assert_allclose(run.events["t"], 1.08, atol=1e-14)

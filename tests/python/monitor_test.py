@@ -111,6 +111,21 @@ def test_a_ball_comes_to_rest_and_is_held():
         monitor.examine(10.0, 0.1, [0, 0], [0, 0], [0, 0], [0, 0])
 
 
+def test_another_guard_that_moves_a_standing_one_outward_gives_it_its_event():
+    # A cart (x, v) that stands at 0, and a clock that pushes it outward once a second.
+    def flow(t, x):
+        return np.array([x[1], 0.0, 1.0])
+
+    cart = ricochet.System(flow, [
+        ricochet.Guard(lambda t, x: x[0], name="stop", reset=lambda t, x: [x[0], 0.0, x[2]]),
+        ricochet.Guard(lambda t, x: 1 - x[2], name="push", reset=lambda t, x: [x[0], -1.0, 0.0])])
+    monitor = Monitor(cart, [0.0] * 3)
+    assert drive(monitor, flow, 0.0, np.zeros(3), 3.5, cuts=[]) is Verdict.STANDS
+    assert monitor.events["guard"].tolist() == [1, 0] * 3
+    assert monitor.events["t"] == pytest.approx([1, 1, 2, 2, 3, 3], abs=1e-13)
+    assert monitor.x[0] == 0
+
+
 def test_a_host_keeps_what_a_rest_holds_while_the_rest_moves():
     # x, y and their rates; y is lifted from 1 s on, and hangs free at 2 s.
     def free(t, x):
