@@ -94,7 +94,14 @@ HandOverOptions completed(HandOverOptions options, bool locate)
     options.set_valued.t_end = options.t_end;
     if (options.set_valued.step == 0) options.set_valued.step = span > 0 ? 1e-3 * span : 1;
     options.set_valued.max_attempts = std::min(options.set_valued.max_attempts, options.max_steps);
-    if (locate) options.set_valued.switches = Switches::located;
+    if (!locate) return options;
+    options.set_valued.switches = Switches::located;
+    const bool constant = std::holds_alternative<ConstantStep>(options.set_valued.controller);
+    if (!constant || options.set_valued.estimate != ErrorEstimate::none) {
+        Refuse{"HandOverOptions"}(
+            "found a set_valued.controller or an estimate beside branches, whose set-valued steps "
+            "have constant length; expected neither, or a SetValuedMotion");
+    }
     return options;
 }
 

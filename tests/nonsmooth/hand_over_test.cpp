@@ -614,6 +614,12 @@ TEST(HandOver, RefusesWhatCannotBeRight)
     EXPECT_THROW((void)hand_over(TwinRelays{}, zero, {.t_end = 1, .sample_times = {0.5, 0.2}}),
                  std::invalid_argument);
     EXPECT_THROW(RollingBall({.radius = 0}), std::invalid_argument);
+    HandOverOptions controlled{.t_end = 1};
+    controlled.set_valued.controller = FilteredStep::h211b(4);
+    EXPECT_THROW((void)hand_over(TwinRelays{}, zero, controlled), std::invalid_argument);
+    HandOverOptions estimated{.t_end = 1};
+    estimated.set_valued.estimate = ErrorEstimate::doubling;
+    EXPECT_THROW((void)hand_over(TwinRelays{}, zero, estimated), std::invalid_argument);
 }
 
 /// A half line of reactions: beyond its surface the reaction would be infinite.
