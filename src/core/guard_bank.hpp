@@ -270,7 +270,9 @@ public:
         GuardRecord& record = (*this)[i];
         if (side == record.last_side && record.side == opposite(side)) record.returned = true;
         record.side = side;
-        if constexpr (!single) any_stands_ = any_stands_ || side == Side::plateau;
+        if constexpr (!single) {
+            any_stands_ = any_stands_ || (side == Side::plateau && size() > 1);
+        }
         sign_[i] = records_[i].enabled && !records_[i].deferred ? sign_of(side) : 0;
         as_screened_ = false;
     }
@@ -480,7 +482,7 @@ public:
         }
         if (keeps_rows_) row_.visit(visit);
         visit(waiting_);
-        if (!single) visit(any_stands_);
+        if (size() > 1) visit(any_stands_);
         visit(armed_at_);
         heed_enabled();
     }

@@ -223,7 +223,7 @@ TEST(MergedResets, TheFirstStopGivesItsReasonOnce)
     const Reset stops = [&](Mode, State& x) -> Mode {
         ++asked;
         x[0] = 9;
-        throw Stop("the cable is cut");
+        throw StopRun("the cable is cut");
     };
     const auto merged = Set({stops, sets(0, 9)}).apply(state(1, 0));
     EXPECT_TRUE(merged.stops());
