@@ -32,7 +32,7 @@ PhaseRules::PhaseRules(const BranchPhases& any, bool by_mode, const PhaseOptions
     flow_.assign(size_, 0);
     if (options.alone) stall_ = {options.t_start, options.t_end, options.alone->stall_steps};
     arrived_.assign(count_, false);
-    branch_guards_.assign(BranchPhases::guards_of_reaction * count_, 1);
+    observed_.assign(count_, 0);
 }
 
 void PhaseRules::choose_watched(ModeInclusion& of, const double* x0)
@@ -97,19 +97,17 @@ double PhaseRules::guard(std::size_t which, Kind kind, double t, const double* x
 
 void PhaseRules::guards(Kind kind, double t, const double* x, std::span<double> g) const
 {
-    std::fill(g.begin(), g.end(), 1.0);
-    if (!has_inclusion()) return;
     constexpr std::size_t from = BranchPhases::guards_of_reaction;
-    if (is_explicit(kind)) {
-        inclusion().guards(branches_of(kind), t, x, branch_guards_.data());
+    const std::size_t stride = guards_of_reaction();
+    if (has_inclusion() && is_explicit(kind)) {
+        for (std::size_t i = from; i < g.size(); i += stride) g[i] = 1;
+        return inclusion().guards(branches_of(kind), t, x, g.data(), stride);
+    }
+    std::fill(g.begin(), g.end(), 1.0);
+    if (has_inclusion() && kind == own) {
+        inclusion().observe(t, x, observed_.data());
         for (std::size_t i = 0; i < count(); ++i) {
-            std::copy_n(branch_guards_.data() + from * i, from,
-                        g.data() + guards_of_reaction() * i);
-        }
-    } else if (kind == own) {
-        inclusion().observe(t, x, branch_guards_.data());
-        for (std::size_t i = 0; i < count(); ++i) {
-            g[guards_of_reaction() * i + from] = branch_guards_[i];
+            g[stride * i + from] = observed_[i];
         }
     }
 }
@@ -127,19 +125,17 @@ double PhaseRules::guard_rate(std::size_t which, Kind kind, double t, const doub
 void PhaseRules::guard_rates(Kind kind, double t, const double* x, const double* dxdt,
                              std::span<double> rates) const
 {
-    std::fill(rates.begin(), rates.end(), 0.0);
-    if (!has_inclusion()) return;
     constexpr std::size_t from = BranchPhases::guards_of_reaction;
-    if (is_explicit(kind)) {
-        inclusion().guard_rates(branches_of(kind), t, x, dxdt, branch_guards_.data());
-        for (std::size_t i = 0; i < count(); ++i) {
-            std::copy_n(branch_guards_.data() + from * i, from,
-                        rates.data() + guards_of_reaction() * i);
-        }
-    } else if (kind == own) {
+    const std::size_t stride = guards_of_reaction();
+    if (has_inclusion() && is_explicit(kind)) {
+        for (std::size_t i = from; i < rates.size(); i += stride) rates[i] = 0;
+        return inclusion().guard_rates(branches_of(kind), t, x, dxdt, rates.data(), stride);
+    }
+    std::fill(rates.begin(), rates.end(), 0.0);
+    if (has_inclusion() && kind == own) {
         for (std::size_t i = 0; i < count(); ++i) {
             if (!now_->watched[i]) continue;
-            const std::size_t which = guards_of_reaction() * i + from;
+            const std::size_t which = stride * i + from;
             rates[which] = guard_rate(which, kind, t, x, dxdt);
         }
     }

@@ -326,7 +326,7 @@ private:
     std::vector<double> y_, y_before_, lower_, upper_, rates_, flow_;
     std::vector<bool> arrived_;
     std::vector<std::size_t> kept_;
-    mutable std::vector<double> branch_guards_;
+    mutable std::vector<double> observed_;
     std::vector<ReactionChange> changes_;
     std::vector<BranchChange> branch_changes_;  ///< of an inclusion alone
     std::vector<Phase> phases_;

@@ -124,11 +124,12 @@ public:
     [[nodiscard]] virtual bool enabled(std::size_t which, Mode b) const noexcept = 0;
     [[nodiscard]] virtual double guard(std::size_t which, Mode b, double t,
                                        const double* x) const = 0;
-    virtual void guards(Mode b, double t, const double* x, double* g) const = 0;
+    /// All of them, those of reaction i from g[i stride] on.
+    virtual void guards(Mode b, double t, const double* x, double* g, std::size_t stride) const = 0;
     [[nodiscard]] virtual double guard_rate(std::size_t which, Mode b, double t, const double* x,
                                             const double* dxdt) const = 0;
-    virtual void guard_rates(Mode b, double t, const double* x, const double* dxdt,
-                             double* rates) const = 0;
+    virtual void guard_rates(Mode b, double t, const double* x, const double* dxdt, double* rates,
+                             std::size_t stride) const = 0;
     /// See `AnyModes::reset`.
     [[nodiscard]] virtual Mode reset(std::span<const std::size_t> fired, Mode b, double t,
                                      double* x) const = 0;

@@ -114,23 +114,23 @@ public:
     {
         return modes_.guard(of_modes(which), b, t, array(x));
     }
-    void guards(Mode b, double t, const double* x, double* g) const override
+    void guards(Mode b, double t, const double* x, double* g, std::size_t stride) const override
     {
         std::array<double, Modes::guard_count> all;
         modes_.guards(b, t, array(x), all);
-        spread(all, g);
+        spread(all, g, stride);
     }
     [[nodiscard]] double guard_rate(std::size_t which, Mode b, double t, const double* x,
                                     const double* dxdt) const override
     {
         return modes_.guard_rate(of_modes(which), b, t, array(x), array(dxdt));
     }
-    void guard_rates(Mode b, double t, const double* x, const double* dxdt,
-                     double* rates) const override
+    void guard_rates(Mode b, double t, const double* x, const double* dxdt, double* rates,
+                     std::size_t stride) const override
     {
         std::array<double, Modes::guard_count> all;
         modes_.guard_rates(b, t, array(x), array(dxdt), all);
-        spread(all, rates);
+        spread(all, rates, stride);
     }
     [[nodiscard]] Mode reset(std::span<const std::size_t> fired, Mode b, double t,
                              double* x) const override
@@ -174,13 +174,14 @@ public:
         for (const double room : rooms) {
             if (room < 0) return exits(b, t0, w0, rooms) ? 1 : -1;
         }
-        const double fraction =
-            held_.fraction(modes_, {.mode = b,
-                                    .t0 = t0,
-                                    .t1 = t1,
-                                    .w0 = w0,
-                                    .w1 = w1,
-                                    .event_tolerance = options_.event_tolerance});
+        const double fraction = held_.fraction(modes_,
+                                               {.mode = b,
+                                                .t0 = t0,
+                                                .t1 = t1,
+                                                .w0 = w0,
+                                                .w1 = w1,
+                                                .event_tolerance = options_.event_tolerance},
+                                               motion, rooms);
         held_end_ = {t1, t1 - t0, b, w1};
         return held_.starts_beyond() ? -1 : fraction;
     }
@@ -343,10 +344,13 @@ private:
                           kind = which % Base::guards_of_reaction;
         return kind < 4 ? 4 * i + kind : Modes::first_set_guard + i;
     }
-    void spread(const std::array<double, Modes::guard_count>& all, double* g) const
+    void spread(const std::array<double, Modes::guard_count>& all, double* g,
+                std::size_t stride) const
     {
-        const std::size_t count = Base::guards_of_reaction * reactions();
-        for (std::size_t k = 0; k < count; ++k) g[k] = all[of_modes(k)];
+        for (std::size_t i = 0; i < reactions(); ++i, g += stride) {
+            for (std::size_t k = 0; k < 4; ++k) g[k] = all[4 * i + k];
+            g[4] = all[Modes::first_set_guard + i];
+        }
     }
 
     [[nodiscard]] X array(const double* x) const

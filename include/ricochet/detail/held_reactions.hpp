@@ -41,6 +41,15 @@ public:
     /// The fraction of a step that would follow the reactions; 1 if the step does.
     [[nodiscard]] double fraction(const Modes& modes, const Step& step)
     {
+        Motion motion;
+        Rooms rooms;
+        modes.rooms(step.mode, step.t1, step.w1, motion, rooms);
+        return fraction(modes, step, motion, rooms);
+    }
+    /// The same, with the motion and the rooms at the end of the step.
+    [[nodiscard]] double fraction(const Modes& modes, const Step& step, const Motion& motion,
+                                  const Rooms& rooms)
+    {
         starts_beyond_ = false;
         if (!(step.t1 > step.t0)) return 1;
         const double h = step.h();
@@ -48,7 +57,9 @@ public:
         end_.mode = step.mode;
         if (!goes_on) evaluate(modes, step.t0, step.w0, h, end_);
         start_ = end_;
-        evaluate(modes, step.t1, step.w1, -h, end_);
+        end_.motion = motion;
+        end_.rooms = rooms;
+        find_change(modes, step.t1, step.w1, -h, end_);
         // A step that is much longer than the one before could agree by accident.
         const double growth = goes_on ? h / length_ : std::numeric_limits<double>::infinity();
         if (growth > 2) {
@@ -101,8 +112,12 @@ private:
     /// end.
     void evaluate(const Modes& modes, double t, const Vector& w, double ahead, End& end)
     {
-        end.t = t;
         modes.rooms(end.mode, t, w, end.motion, end.rooms);
+        find_change(modes, t, w, ahead, end);
+    }
+    void find_change(const Modes& modes, double t, const Vector& w, double ahead, End& end)
+    {
+        end.t = t;
         const double step = nudge * ahead;
         move(inside_, w, step, end.motion.rate);
         modes.rooms(end.mode, t + step, inside_, motion_, end.change);

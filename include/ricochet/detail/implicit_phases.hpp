@@ -165,7 +165,7 @@ public:
         matrices().observed(t, vector(x), y);
         return -y[index(which / guards_of_reaction)];
     }
-    void guards(Mode, double, const double*, double*) const override {}
+    void guards(Mode, double, const double*, double*, std::size_t) const override {}
     [[nodiscard]] double guard_rate(std::size_t which, Mode, double t, const double*,
                                     const double* dxdt) const override
     {
@@ -173,7 +173,10 @@ public:
         matrices().subtract_offset_rate(t, rate);
         return -rate[index(which / guards_of_reaction)];
     }
-    void guard_rates(Mode, double, const double*, const double*, double*) const override {}
+    void guard_rates(Mode, double, const double*, const double*, double*,
+                     std::size_t) const override
+    {
+    }
     [[nodiscard]] Mode reset(std::span<const std::size_t>, Mode b, double, double*) const override
     {
         return b;
