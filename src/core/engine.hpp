@@ -577,6 +577,9 @@ protected:
     /// Whether the events of a fired guard accumulate here, so that it comes to rest or the run
     /// ends.
     [[nodiscard]] bool rest_fired();
+    /// Whether guard i, which fires once more at an instant, was carried away from its surface in
+    /// between: it may do so up to a thousand times.
+    [[nodiscard]] bool comes_from_afar(std::size_t i);
 
     /// Whether the fired guards prolong a row of events with excursions that are lost in rounding,
     /// by which a cycle of guards accumulates.

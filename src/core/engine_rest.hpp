@@ -14,7 +14,12 @@ inline bool EventEngine<X, single>::rest_fired()
     for (const std::size_t i : search_.fired()) {
         ShrinkingIntervals& intervals = bank_[i].intervals;
         const bool again = std::exchange(bank_[i].again, false);
-        const bool stalls = intervals.stalls(step_.start(), h_next_) || again;
+        bool stalls = intervals.stalls(step_.start(), h_next_);
+        if (stalls && comes_from_afar(i)) {
+            stalls = false;
+            intervals.forget_stall();
+        }
+        stalls = stalls || again;
         const double tolerance = resolution_.tolerance(step_.start().value);
         const bool resetting = resets_any_ && bank_[i].info.resets;
         if (resetting && located_) {
@@ -31,6 +36,14 @@ inline bool EventEngine<X, single>::rest_fired()
     }
     if (rested && !ended_) pending_ = Pending::arm;
     return rested;
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::comes_from_afar(std::size_t i)
+{
+    if (located_ || !bank_.keeps_armed()) return false;
+    if (std::as_const(bank_)[i].excursions.has_fallen()) return false;
+    return std::fabs(bank_.armed_value(i)) > tolerances::of_fading * rounding_of(i);
 }
 
 template <class X, bool single>

@@ -33,10 +33,12 @@ public:
     using Guards::view;
 
     GuardBank(const SystemAt<X>& system, const BankRules& rules, bool backward)
-        : Guards(system, rules, backward), keeps_rows_(size() > 1 || system->moded)
+        : Guards(system, rules, backward),
+          keeps_rows_(size() > 1 || system->moded),
+          timed_(system->timed())
     {
         if (rules.keeps_sizes()) sizes_.resize(size());
-        if (keeps_rows_) armed_g_.resize(size());
+        if (keeps_armed()) armed_g_.resize(size());
     }
 
     /// Forgets the past of the guards, except for the numbers of their events.
@@ -438,11 +440,13 @@ public:
 
     /// Whether events of several guards, or in several modes, may accumulate together.
     [[nodiscard]] bool keeps_rows() const noexcept { return keeps_rows_; }
+    /// Whether the values are known that the guards were armed with.
+    [[nodiscard]] bool keeps_armed() const noexcept { return keeps_rows_ || timed_; }
     [[nodiscard]] LostRow& row() noexcept { return row_; }
     /// Keeps the values of the guards at the start of the step, after an acting instant.
     void keep_armed_values() noexcept
     {
-        if (!keeps_rows_) return;
+        if (!keeps_armed()) return;
         for (std::size_t i = 0; i < size(); ++i) armed_g_[i] = g0_[i];
     }
     /// Guard i right after the last acting instant.
@@ -478,7 +482,7 @@ public:
             if (rules_.defers) visit(record.deferred);
             record.intervals.visit(visit);
             if (keeps_rows_) record.excursions.visit(visit);
-            if (keeps_rows_) visit(armed_g_[i]);
+            if (keeps_armed()) visit(armed_g_[i]);
         }
         if (keeps_rows_) row_.visit(visit);
         visit(waiting_);
@@ -586,7 +590,7 @@ private:
     Doubles sizes_{};
     Doubles armed_g_{};
     LostRow row_;
-    bool keeps_rows_;
+    bool keeps_rows_, timed_;
     bool any_stands_ = false;
 };
 

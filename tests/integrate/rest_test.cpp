@@ -270,5 +270,57 @@ TEST(Stalled, IsSaidOfEventsThatHardlyAdvanceTheTime)
     EXPECT_LE(run.statistics.events, 300'000U);
 }
 
+/// A clock with many entries of one time, each of which puts one customer before a guard that
+/// serves it at once.
+struct Queue {
+    using State = std::array<double, 2>;
+    Times time_events;
+
+    explicit Queue(std::size_t customers) : time_events(std::vector<double>(customers, 1.0)) {}
+
+    static void flow(double, const State&, State& dxdt) { dxdt = {0, 0}; }
+    static double guard(double, const State& x) { return 0.5 - x[0]; }
+    static void reset(double, State& x) { x = {0, x[1] + 1}; }
+    static void rest(double, State& x) { x = {0, -1}; }
+    static void time_reset(double, State& x) { x[0] = 1; }
+};
+
+TEST(Rest, AQueueThatIsServedAtOneInstantIsNoAccumulation)
+{
+    for (const std::size_t customers : {99, 102, 150, 990}) {
+        const auto run = integrate(Queue(customers), {0, 0}, {.t_end = 2});
+        EXPECT_EQ(run.outcome, Outcome::reached_end);
+        EXPECT_EQ(run.x[1], static_cast<double>(customers));
+    }
+}
+
+/// Two guards throw a ball to and fro at one instant, n times.
+struct PingPong {
+    using State = std::array<double, 2>;
+    static constexpr std::size_t guard_count = 2;
+    double throws = 0;
+
+    static void flow(double, const State& x, State& dxdt) { dxdt = {x[1] == 0 ? 1.0 : 0.0, 0}; }
+    static double guard(std::size_t which, double, const State& x)
+    {
+        return which == 0 ? 0.5 - x[0] : x[0] + 0.5;
+    }
+    void reset(std::size_t which, double, State& x) const
+    {
+        x = {x[1] + 1 < throws ? (which == 0 ? -1.0 : 1.0) : 0.0, x[1] + 1};
+    }
+};
+
+TEST(Rest, ABallThrownToAndFroAtOneInstantIsNoAccumulation)
+{
+    for (const double throws : {100, 210, 400, 1600}) {
+        const auto run = integrate(PingPong{throws}, {0, 0}, {.t_end = 2});
+        EXPECT_EQ(run.outcome, Outcome::reached_end) << throws;
+        EXPECT_EQ(run.x[1], throws);
+    }
+    // The thousandth event of one guard at an instant is one too many.
+    EXPECT_EQ(integrate(PingPong{3000}, {0, 0}, {.t_end = 2}).outcome, Outcome::endless_cascade);
+}
+
 }  // namespace
 }  // namespace ricochet::rest_test

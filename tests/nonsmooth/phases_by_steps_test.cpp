@@ -359,5 +359,31 @@ TEST(PhasesBySteps, TaylorSeriesFollowTheFlowBesideAnInclusion)
     expect_times(times_of(run.events, EventKind::stick), {1});
 }
 
+/// A disc that rubs on a plane, without a load once it rests, beside a component of its own rate.
+struct DiscBeside {
+    static constexpr int state_size = 3, reaction_size = 2;
+    double rate = 0;
+
+    void smooth(double, const Eigen::Vector3d&, Eigen::Vector3d& f) const { f << 0, 0, rate; }
+    static void observe(Eigen::Matrix<double, 2, 3>& e) { e << 1, 0, 0, 0, 1, 0; }
+    [[nodiscard]] static sets::Ball<2> reaction_set(double, const Eigen::Vector3d&)
+    {
+        return sets::Ball<2>(1);
+    }
+};
+
+TEST(PhasesBySteps, ADiscAtRestBreaksNoLawWhateverMovesBesideIt)
+{
+    for (const double rate : {0.0, -1e-3, -1.0, -10.0}) {
+        for (const double speed : {0.1, 0.2, 0.5, 1.0, 2.0}) {
+            const auto run = hand_over(DiscBeside{rate},
+                                       Eigen::Vector3d(0.6 * speed, 0.8 * speed, 0), {.t_end = 9});
+            EXPECT_EQ(run.outcome, Outcome::reached_end) << rate << " " << speed;
+            // It stops after `speed` seconds, and rests up to the solver's 1e-10.
+            EXPECT_LT(run.state.w.head<2>().norm(), 1e-9);
+        }
+    }
+}
+
 }  // namespace
 }  // namespace ricochet::phases_by_steps_test

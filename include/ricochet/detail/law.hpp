@@ -15,9 +15,9 @@ namespace ricochet {
 /// The largest violation of "reaction in K and -y in the normal cone of K at the reaction" at
 /// (t, w), as a fraction of the forces: 0 where the law holds, and of the order of 1 where a
 /// reaction acts at the wrong bound. A y counts as zero below 1e-9 of its terms and of the change
-/// that the forces, and reactions at the nearer of their bounds, cause in `span` [s], such as a
-/// step. For boxes each component is taken by itself; infinite where a set is empty. For a set of
-/// states it is 0, since the law is then the solver's residual.
+/// that the forces, and reactions at the nearer of their bounds or against y, cause in `span` [s],
+/// such as a step. For boxes each component is taken by itself; infinite where a set is empty. For
+/// a set of states it is 0, since the law is then the solver's residual.
 template <int N, int M>
 [[nodiscard]] double law_violation(
     const detail::AnyMatrices<N, M>& m, double t,
@@ -44,6 +44,18 @@ template <int N, int M>
             if (std::isfinite(nearer)) most[i] = std::max(most[i], nearer);
         }
     }
+    // The reaction of a set that is no box at a y, however small.
+    const auto against = [&](Reaction& z) {
+        const double length = y.template lpNorm<Eigen::Infinity>();
+        z = reaction;
+        if (length > 0) z -= scale * (y / length);  // y may be denormal
+        return inclusion.project(t, w, z, z);
+    };
+    Reaction z = reaction;
+    if (!m.traits().box) {
+        if (!against(z)) return std::numeric_limits<double>::infinity();
+        most = most.cwiseMax(z.cwiseAbs()).eval();
+    }
     f = f.cwiseAbs().eval() + detail::times(m.act().cwiseAbs(), most);
     f = w.cwiseAbs() + span * detail::times(m.inverse_mass().cwiseAbs(), f).eval();
     size = 1e-9 * (detail::times(m.observe().cwiseAbs(), f) + size.cwiseAbs());
@@ -62,10 +74,7 @@ template <int N, int M>
         for (Eigen::Index i = 0; i < y.size(); ++i) {
             if (std::abs(y[i]) <= size[i]) y[i] = 0;
         }
-        const double length = y.template lpNorm<Eigen::Infinity>();
-        Reaction z = reaction;
-        if (length > 0) z -= scale / length * y;
-        if (!inclusion.project(t, w, z, z)) return std::numeric_limits<double>::infinity();
+        if (!against(z)) return std::numeric_limits<double>::infinity();
         worst = (z - reaction).template lpNorm<Eigen::Infinity>() / scale;
     }
     return std::isfinite(worst) ? worst : std::numeric_limits<double>::infinity();

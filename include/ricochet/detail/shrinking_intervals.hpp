@@ -55,6 +55,10 @@ public:
         return false;
     }
 
+    /// Begins to count the events at one time again: they are far apart in the guard, as those of a
+    /// queue that is served at one instant.
+    void forget_stall() noexcept { stalled_ = 0; }
+
     /// Starts again after the motion has come to rest. Events that do not advance the time are
     /// counted on: a rest need not end them.
     void come_to_rest() noexcept
