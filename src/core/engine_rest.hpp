@@ -41,7 +41,8 @@ inline bool EventEngine<X, single>::rest_fired()
 template <class X, bool single>
 bool EventEngine<X, single>::comes_from_afar(std::size_t i)
 {
-    if (located_ || !bank_.keeps_armed()) return false;
+    const bool on_time = timed_ && passed_ == step_.start().value;
+    if (located_ || !bank_.keeps_armed() || (level_ <= 1 && !on_time)) return false;
     if (std::as_const(bank_)[i].excursions.has_fallen()) return false;
     return std::fabs(bank_.armed_value(i)) > tolerances::of_fading * rounding_of(i);
 }
