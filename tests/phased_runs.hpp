@@ -89,4 +89,28 @@ inline void expect_times(const std::vector<double>& found, const std::vector<dou
     };
 }
 
+/// A body that two contacts hold at once, with bounds 1 and 3, under the load t.
+struct TwoContacts {
+    using State = std::array<double, 1>;
+
+    struct Motion {
+        static constexpr int state_size = 1, reaction_size = 2;
+        using Vector = Eigen::Matrix<double, 1, 1>;
+        using Reaction = Eigen::Vector2d;
+
+        static void smooth(double t, const Vector&, Vector& out) { out[0] = t; }
+        static void observe(Eigen::Matrix<double, 2, 1>& e) { e << 1, 1; }
+        static void act(Eigen::Matrix<double, 1, 2>& g) { g << 1, 1; }
+        static sets::Box<2> reaction_set(double, const Vector&)
+        {
+            return sets::Box<2>({-1, -3}, {1, 3});
+        }
+    };
+
+    static void flow(double t, const State& x, State& dxdt) { dxdt[0] = t - (x[0] >= 0 ? 4 : -4); }
+    static double guard(double, const State& x) { return x[0]; }
+    static GuardInfo guard_info() { return {.crossing = Crossing::either, .resets = false}; }
+    static Motion set_valued() { return {}; }
+};
+
 }  // namespace ricochet

@@ -178,12 +178,19 @@ TEST(BranchModes, ReactionsThatDependOnEachOtherAreHeldTogether)
 // --- held reactions ---
 
 /// The fraction of a step from t0 to t1, in which the block stands, that would follow its reaction.
+double fraction_of(const Modes& modes, detail::HeldReactions<1, 1>& reactions, double t0, double t1)
+{
+    const Vector1 w(0.0);
+    Modes::Motion motion;
+    Modes::Rooms rooms;
+    modes.rooms(held, t1, w, motion, rooms);
+    return reactions.fraction(modes, {held, t0, t1, w, w, 0}, motion, rooms);
+}
 double fraction_of(const Block& block, double t0, double t1)
 {
     const BranchModes<Block> modes(block);
     detail::HeldReactions<1, 1> reactions;
-    const Vector1 w(0.0);
-    return reactions.fraction(modes, {held, t0, t1, w, w, 0});
+    return fraction_of(modes, reactions, t0, t1);
 }
 
 TEST(HeldReactions, AReactionInsideItsBoundsIsFollowed)
@@ -208,8 +215,7 @@ TEST(HeldReactions, OneThatStartsBeyondItsBoundIsNamed)
 {
     const BranchModes<Block> modes(pulled_by(1.25));
     detail::HeldReactions<1, 1> reactions;
-    const Vector1 w(0.0);
-    (void)reactions.fraction(modes, {held, 0, 1, w, w, 0});
+    (void)fraction_of(modes, reactions, 0, 1);
     EXPECT_TRUE(reactions.starts_beyond());
 }
 

@@ -273,27 +273,6 @@ TEST(PhasesBySteps, AnAccumulationThatNoReactionEndsEndsARunOfFixedSteps)
     EXPECT_NEAR(run.t, 4.5, 1e-6);
 }
 
-/// A body that two contacts hold at once, with bounds 1 and 3, under the load t.
-struct TwoContacts {
-    using State = std::array<double, 1>;
-
-    struct Motion {
-        static constexpr int state_size = 1, reaction_size = 2;
-        using Vector = Eigen::Matrix<double, 1, 1>;
-
-        static void smooth(double t, const Vector&, Vector& out) { out[0] = t; }
-        static void observe(Eigen::Matrix<double, 2, 1>& e) { e << 1, 1; }
-        static void act(Eigen::Matrix<double, 1, 2>& g) { g << 1, 1; }
-        static sets::Box<2> reaction_set(double, const Vector&)
-        {
-            return sets::Box<2>({-1, -3}, {1, 3});
-        }
-    };
-
-    static void flow(double t, const State& x, State& dxdt) { dxdt[0] = t - (x[0] >= 0 ? 4 : -4); }
-    static Motion set_valued() { return {}; }
-};
-
 TEST(PhasesBySteps, FixedImplicitStepsHaveTheGivenLength)
 {
     // It slips at 4: v(6) = 2. The step in which it slips is not cut, and misses the load of at

@@ -39,14 +39,7 @@ class RICOCHET_ALIGNED HeldReactions {
 
 public:
     /// The fraction of a step that would follow the reactions; 1 if the step does.
-    [[nodiscard]] double fraction(const Modes& modes, const Step& step)
-    {
-        Motion motion;
-        Rooms rooms;
-        modes.rooms(step.mode, step.t1, step.w1, motion, rooms);
-        return fraction(modes, step, motion, rooms);
-    }
-    /// The same, with the motion and the rooms at the end of the step.
+    /// @param motion, rooms  at the end of the step
     [[nodiscard]] double fraction(const Modes& modes, const Step& step, const Motion& motion,
                                   const Rooms& rooms)
     {

@@ -1,4 +1,4 @@
-// Ordinary hybrid systems that also give their motion as an inclusion.
+// Ordinary hybrid systems whose inclusion takes over where their events cannot continue the motion.
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 #include "ricochet/systems/friction_inclusion.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
 
-namespace ricochet::event_hand_over_test {
+namespace ricochet::take_over_test {
 namespace {
 
 /// A mass on a spring and on a belt, written without regard to sticking: the
@@ -37,7 +37,7 @@ struct Belt {
     [[nodiscard]] const FrictionInclusion& set_valued() const { return inclusion; }
 };
 
-TEST(EventHandOver, AMassThatWouldChatterSticks)
+TEST(TakeOver, AMassThatWouldChatterSticks)
 {
     // From 2 m against 0.3 N: it turns at pi, 2 pi and 3 pi, 0.6 m less each time, and stays at
     // -0.2 m, where the spring is weaker than friction.
@@ -61,7 +61,7 @@ TEST(EventHandOver, AMassThatWouldChatterSticks)
     EXPECT_NEAR(run.trajectory.x[1][0], -0.2, 1e-9);
 }
 
-TEST(EventHandOver, StickSlipIsGivenBackAtEverySlip)
+TEST(TakeOver, StickSlipIsGivenBackAtEverySlip)
 {
     // It sticks to the belt until the spring is stretched to the largest static friction, 1 N at 1
     // m, then slips, and so on: the slips are one period apart.
@@ -89,7 +89,7 @@ TEST(EventHandOver, StickSlipIsGivenBackAtEverySlip)
     EXPECT_NEAR(run.x[0], alone.state.w[0], 1e-6);
 }
 
-TEST(EventHandOver, StepsOfAllPhasesCountTowardsTheLimit)
+TEST(TakeOver, StepsOfAllPhasesCountTowardsTheLimit)
 {
     const Belt belt{FrictionInclusion(
         {.belt_speed = 0.2, .friction = 1, .weakening = 3, .law = FrictionLaw::hyperbolic})};
@@ -135,7 +135,7 @@ struct Relay {
     [[nodiscard]] const SlidingMode& set_valued() const { return inclusion; }
 };
 
-TEST(EventHandOver, TwoFieldsThatPointAtEachOtherSlide)
+TEST(TakeOver, TwoFieldsThatPointAtEachOtherSlide)
 {
     const Relay relay;
     const auto run = integrate(relay, Relay::State(Relay::State::Constant(SlidingMode::start)),
@@ -227,7 +227,7 @@ void expect_few_crossings(const LoadedBelt& belt, const LoadedBelt::State& x0, d
     EXPECT_NEAR(run.x[1], alone.state.w[1], 1e4 * tolerance);
 }
 
-TEST(EventHandOver, SwitchingWithinTheErrorOfStepsIsHandedOver)
+TEST(TakeOver, SwitchingWithinTheErrorOfStepsIsHandedOver)
 {
     const LoadedInclusion inclusion{
         .stiffness = 2.0943252172686426,
@@ -274,7 +274,7 @@ struct Thrown {
     [[nodiscard]] static Friction set_valued() { return {}; }
 };
 
-TEST(EventHandOver, TimeEventsHappenUnderTheInclusion)
+TEST(TakeOver, TimeEventsHappenUnderTheInclusion)
 {
     const auto run =
         integrate(Thrown{}, Thrown::State{2.5, 0.1},
@@ -328,7 +328,7 @@ struct Kicked {
     [[nodiscard]] static Friction set_valued() { return {}; }
 };
 
-TEST(EventHandOver, ATimeEventAtWhichTheInclusionEndsIsNotLost)
+TEST(TakeOver, ATimeEventAtWhichTheInclusionEndsIsNotLost)
 {
     for (int i = 0; i < 40; ++i) {
         const Kicked kicked{0.5003 + 0.01 * i};
@@ -341,7 +341,7 @@ TEST(EventHandOver, ATimeEventAtWhichTheInclusionEndsIsNotLost)
     }
 }
 
-TEST(EventHandOver, EventsThatAreNotRecordedAreStillReviewed)
+TEST(TakeOver, EventsThatAreNotRecordedAreStillReviewed)
 {
     const Kicked kicked{0.7};
     const Options options{.t_end = 10, .rtol = 1e-8, .atol = 1e-10, .max_steps = 20'000};
@@ -372,14 +372,14 @@ struct Divided : Thrown {
     }
 };
 
-TEST(EventHandOver, StatisticsCountDividedSteps)
+TEST(TakeOver, StatisticsCountDividedSteps)
 {
     const auto run = integrate(Divided{}, Divided::State{2.5, 0.1}, {.t_end = 10, .rtol = 1e-10});
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_GT(run.statistics.event_driven.refined_steps, 0U);
 }
 
-TEST(EventHandOver, AnInclusionAloneNeedsNoOtherCall)
+TEST(TakeOver, AnInclusionAloneNeedsNoOtherCall)
 {
     const auto run =
         integrate(SlidingMode{}, SlidingMode::Vector(SlidingMode::Vector::Constant(0.15)),
@@ -401,7 +401,7 @@ struct Ended : Thrown {
     }
 };
 
-TEST(EventHandOver, StopsAfterOneEventAndAfterSeveral)
+TEST(TakeOver, StopsAfterOneEventAndAfterSeveral)
 {
     const Ended::State x0{2.5, 0.1};
     const auto run = integrate(Ended{{}, 1}, x0, {.t_end = 10});
@@ -412,7 +412,7 @@ TEST(EventHandOver, StopsAfterOneEventAndAfterSeveral)
     EXPECT_GT(later.t, run.t);
 }
 
-TEST(EventHandOver, RefusesWhatAHandOverDoesNotHave)
+TEST(TakeOver, RefusesWhatAHandOverDoesNotHave)
 {
     const Belt belt;
     const Belt::State x0{2, 0};
@@ -420,7 +420,7 @@ TEST(EventHandOver, RefusesWhatAHandOverDoesNotHave)
     EXPECT_THROW((void)integrate(belt, x0, {.t_end = 1, .rtol = -1}), std::invalid_argument);
 }
 
-TEST(EventHandOver, RefusesOptionsThatARunOfAnInclusionAloneDoesNotUse)
+TEST(TakeOver, RefusesOptionsThatARunOfAnInclusionAloneDoesNotUse)
 {
     const SlidingMode inclusion;
     const auto start = StateOf<SlidingMode>::Constant(1).eval();
@@ -446,4 +446,4 @@ TEST(EventHandOver, RefusesOptionsThatARunOfAnInclusionAloneDoesNotUse)
 }
 
 }  // namespace
-}  // namespace ricochet::event_hand_over_test
+}  // namespace ricochet::take_over_test
