@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/nonsmooth/solvers.hpp"
+#include "ricochet/nonsmooth/hand_over.hpp"
 
 namespace ricochet::test {
 
