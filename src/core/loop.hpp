@@ -79,7 +79,10 @@ public:
         if (guarded_) this->arm_at_start(!options_.continues);
         if (endless_ && !this->may_end()) throw_endless(options.t_end);
         if (guarded_ || timed_) this->settle_all();
-        if (phases_) review_phase(false);
+        if (phases_) {
+            if (phases_->list_in) phases_->list_in(system_.door(), run_.phases);
+            review_phase(false);
+        }
     }
 
     [[nodiscard]] double t() const noexcept override  ///< [s]

@@ -12,6 +12,7 @@ void Loop<X, single>::restart(double t, const X& x, Mode mode)
     if (is_tentative()) take_back();
     Snapshot old;
     visit_state(SnapshotWriter(old));
+    std::vector<Phase> phases = run_.phases;
     try {
         this->who_ = "restart";
         start_at(t, x, mode);
@@ -19,6 +20,7 @@ void Loop<X, single>::restart(double t, const X& x, Mode mode)
     } catch (...) {
         this->who_ = "integrate";
         visit_state(SnapshotReader(old));
+        run_.phases = std::move(phases);
         go_on_from_place();
         throw;
     }

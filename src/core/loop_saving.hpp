@@ -23,6 +23,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
     old.run = properties();
     require_same_run(snapshot.run, old.run);
     visit_state(SnapshotWriter(old));
+    std::vector<Phase> phases = run_.phases;
     try {
         SnapshotReader reader(snapshot);
         visit_state(reader);
@@ -31,6 +32,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
         refuse_bad_place();
     } catch (const std::invalid_argument&) {
         visit_state(SnapshotReader(old));
+        run_.phases = std::move(phases);
         throw;
     }
     go_on_from_place();

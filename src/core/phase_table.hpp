@@ -106,6 +106,10 @@ struct PhaseTable {
     PhaseVerdict (*give_up)(Door, const PhaseEnd<X>&, X& x) = nullptr;
     /// A sentence about the end that the phases have given to the run, or an empty one.
     std::string_view (*reason)(Door) = nullptr;
+    /// Moves the list of phases to `phases`, where it goes on; may be null, as the next one.
+    void (*list_in)(Door, std::vector<Phase>& phases) = nullptr;
+    /// Adds to the result of the run what the phases know of it.
+    void (*complete)(Door, Run<X>& run) = nullptr;
     /// The numbers besides time, mode and state on which the future of the run depends.
     void (*save)(Door, std::vector<double>& memory) = nullptr;
     void (*restore)(Door, const std::vector<double>& memory) = nullptr;

@@ -193,7 +193,7 @@ Kind PhaseRules::enter(double t, double* x)
     memory_ = {};
     reason_.clear();
     changes_.clear();
-    phases_.clear();
+    while (!phases_->empty() && phases_->back().from >= t) phases_->pop_back();
     Kind kind = own;
     if (has_inclusion()) inclusion().check_bounds(t, x);
     if (has_inclusion() && !goes_by_itself(t, x)) {
@@ -565,20 +565,21 @@ void PhaseRules::note(Kind kind, double t, PhaseCause cause)
 {
     memory_.contradicts = 0;
     const double sort = has_own_guards(kind) ? 0 : is_explicit(kind) ? 1 : 2;
-    if (phases_.empty() || sort != memory_.sort) {
+    const bool first = memory_.listed == 0;
+    if (first || sort != memory_.sort) {
         memory_.events = memory_.marked_events = memory_.fluttering = 0;
         memory_.marked_at = memory_.since = t;
         memory_.sort = sort;
     }
     const bool set_valued = is_set_valued(kind);
     const bool plainly = cause == PhaseCause::held || cause == PhaseCause::released;
-    const bool goes_on = !phases_.empty() && set_valued == (memory_.set_valued != 0);
+    const bool goes_on = !first && set_valued == (memory_.set_valued != 0);
     if (goes_on && (!set_valued || plainly)) return;
     memory_.set_valued = set_valued;
-    phases_.push_back({.from = t,
-                       .set_valued = set_valued,
-                       .cause = set_valued || phases_.empty() ? cause : PhaseCause::released});
-    memory_.listed = static_cast<double>(phases_.size());
+    phases_->push_back({.from = t,
+                        .set_valued = set_valued,
+                        .cause = set_valued || first ? cause : PhaseCause::released});
+    memory_.listed = static_cast<double>(phases_->size());
 }
 
 // --- after steps ---
@@ -816,7 +817,7 @@ void PhaseRules::restore(const std::vector<double>& memory)
     if (has_inclusion()) inclusion().restore(std::span(memory).subspan(remembered + sides_.size()));
     reason_.clear();
     const auto listed = static_cast<std::size_t>(memory_.listed);
-    if (phases_.size() > listed) phases_.resize(listed);
+    if (phases_->size() > listed) phases_->resize(listed);
 }
 
 }  // namespace ricochet::detail

@@ -13,6 +13,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../core/phase_table.hpp"
@@ -48,6 +49,8 @@ public:
     /// @param any      the inclusion of some mode, which has the sizes of all
     /// @param by_mode  there is one inclusion for each mode, which holds wherever the mode does
     PhaseRules(const BranchPhases& any, bool by_mode, const PhaseOptions& options);
+    PhaseRules(const PhaseRules&) = delete;
+    PhaseRules& operator=(const PhaseRules&) = delete;
 
     [[nodiscard]] const PhaseOptions& options() const noexcept { return options_; }
 
@@ -183,7 +186,12 @@ public:
     [[nodiscard]] EndInBranches end_in_branches(double t, const double* x) const;
     /// A sentence about the end that the rules have given to the run.
     [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
-    [[nodiscard]] const std::vector<Phase>& phases() const noexcept { return phases_; }
+    /// Moves the list of phases to `phases`, where it goes on.
+    void list_in(std::vector<Phase>& phases)
+    {
+        phases = std::move(*phases_);
+        phases_ = &phases;
+    }
     [[nodiscard]] std::uint64_t implicit_steps() const noexcept { return implicit_steps_; }
 
     // In the mode in which the run is.
@@ -208,7 +216,7 @@ private:
         double contradicts = 0;     ///< a held reaction was beyond its bound at the start of a step
         double gave_up_at = never;  ///< [s]
         double outcome = 0;         ///< of a run that is over
-        double listed = 0;          ///< number of phases
+        double listed = 0;          ///< number of phases; none before the first of a start
     };
     static constexpr std::size_t remembered = sizeof(Memory) / sizeof(double);
 
@@ -329,7 +337,8 @@ private:
     mutable std::vector<double> observed_;
     std::vector<ReactionChange> changes_;
     std::vector<BranchChange> branch_changes_;  ///< of an inclusion alone
-    std::vector<Phase> phases_;
+    std::vector<Phase> first_phases_;           ///< until the list is moved
+    std::vector<Phase>* phases_ = &first_phases_;
     Kind kind_ = own;                       ///< at the end of the last step
     bool begins_ = false;                   ///< no step has been taken since the start
     PhaseCause cause_ = PhaseCause::start;  ///< why the phase that was entered last began

@@ -32,35 +32,6 @@ public:
     }
 
     [[nodiscard]] AnyLoop<C>& loop() noexcept override { return *loop_; }
-    [[nodiscard]] const std::vector<Phase>& phases() const noexcept override
-    {
-        return system_.rules().phases();
-    }
-    [[nodiscard]] HandOverStatistics statistics(const Run<C>& run) const override
-    {
-        HandOverStatistics out;
-        const std::uint64_t implicit = system_.rules().implicit_steps();
-        out.event_driven = run.statistics;
-        out.event_driven.steps -= std::min(implicit, run.statistics.steps);
-        out.set_valued.accepted = implicit;
-        for (const auto& inclusion : system_.inclusions()) {
-            if (!inclusion) continue;
-            out.set_valued.attempted += inclusion->attempts();
-            out.set_valued.stages += inclusion->stages();
-        }
-        const std::vector<Phase>& phases = this->phases();
-        for (std::size_t k = 0; k < phases.size(); ++k) {
-            if (!phases[k].set_valued) {
-                out.to_events += k > 0;
-                continue;
-            }
-            ++out.to_set_valued;
-            out.set_valued_time += (k + 1 < phases.size() ? phases[k + 1].from : run.t);
-            out.set_valued_time -= phases[k].from;
-        }
-        return out;
-    }
-    [[nodiscard]] const StageReport& failure() const noexcept override { return system_.failure(); }
     [[nodiscard]] EndInBranches end_in_branches() const override
     {
         return system_.rules().end_in_branches(loop_->t(), loop_->x().data());
@@ -95,6 +66,22 @@ void refuse_bad_start(const C& x0)
 }
 
 }  // namespace
+
+HandOverStatistics statistics_by_phase(const PhasedCounts& of)
+{
+    HandOverStatistics out{.event_driven = of.all, .set_valued = of.implicit};
+    out.event_driven.steps -= std::min(of.implicit.accepted, of.all.steps);
+    for (std::size_t k = 0; k < of.phases.size(); ++k) {
+        if (!of.phases[k].set_valued) {
+            out.to_events += k > 0;
+            continue;
+        }
+        ++out.to_set_valued;
+        out.set_valued_time += (k + 1 < of.phases.size() ? of.phases[k + 1].from : of.t_end);
+        out.set_valued_time -= of.phases[k].from;
+    }
+    return out;
+}
 
 HandOverOptions options_of_phases(const Options& options)
 {

@@ -73,17 +73,6 @@ public:
 
     [[nodiscard]] const SystemTable<C>& table() const noexcept { return table_; }
     [[nodiscard]] const PhaseRules& rules() const noexcept { return rules_; }
-    /// The stage that has had no solution.
-    [[nodiscard]] const StageReport& failure() const
-    {
-        const BranchPhases* const here = inclusion_of(mode_).inclusion;
-        return here ? here->failure() : some_inclusion().failure();
-    }
-    /// The inclusions of all modes that have one.
-    [[nodiscard]] const std::vector<Owner<BranchPhases>>& inclusions() const noexcept
-    {
-        return inclusions_;
-    }
 
     /// The mode in which a run starts at (t, x) in a mode of the user's.
     [[nodiscard]] Mode enter(Mode mode, double t, C& x)
@@ -145,6 +134,8 @@ private:
     void add_resets();
     void add_time_events();
     void make_phases();
+    /// Adds the counts of the implicit steps and a stage without a solution to the result.
+    void complete(Run<C>& run) const;
 
     // --- guards: the user's, then six for each reaction, of which the last watches own phases ---
 
@@ -784,6 +775,8 @@ void PhasedSystem<C>::make_phases()
         return me.verdict(of, end.mode, end.t, x);
     };
     t.reason = [](void* door) { return std::string_view(at(door).rules_.reason()); };
+    t.list_in = [](void* door, std::vector<Phase>& phases) { at(door).rules_.list_in(phases); };
+    t.complete = [](void* door, Run<C>& run) { at(door).complete(run); };
     t.save = [](void* door, std::vector<double>& memory) {
         const PhasedSystem& me = at(door);
         me.in(me.mode_).save(memory);
@@ -794,6 +787,21 @@ void PhasedSystem<C>::make_phases()
         me.mode_ = static_cast<Mode>(memory.back());
         me.in(me.mode_).restore(memory);
     };
+}
+
+template <class C>
+void PhasedSystem<C>::complete(Run<C>& run) const
+{
+    run.set_valued = {.accepted = rules_.implicit_steps()};
+    for (const auto& inclusion : inclusions_) {
+        if (!inclusion) continue;
+        run.set_valued.attempted += inclusion->attempts();
+        run.set_valued.stages += inclusion->stages();
+    }
+    run.failure = {};
+    if (run.outcome != Outcome::not_converged) return;
+    const BranchPhases* const here = inclusion_of(mode_).inclusion;
+    run.failure = here ? here->failure() : some_inclusion().failure();
 }
 
 template <class C>

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "phased_runs.hpp"
 #include "ricochet/ricochet.hpp"
 #include "sliding_systems.hpp"
 

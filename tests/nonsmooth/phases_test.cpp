@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -89,7 +90,7 @@ TEST(Phases, ABallMeetsItsFloorWhileABlockIsHeld)
     expect_times(times_of(run.events, EventKind::stick), {1});
     ASSERT_EQ(run.phases.size(), 2U);
     EXPECT_EQ(run.phases[1].cause, PhaseCause::held);
-    EXPECT_NEAR(run.statistics.set_valued_time, 2, tolerance);
+    EXPECT_NEAR(run.phases[1].from, 1, tolerance);
 }
 
 TEST(Phases, ARecordedSectionIsCrossedMeanwhile)
@@ -393,7 +394,7 @@ TEST(Phases, AStickIsOneEventWhateverGuardsStandForIt)
     ASSERT_EQ(run.events.size(), 1U);
     EXPECT_EQ(run.events[0].kind, EventKind::stick);
     EXPECT_EQ(run.events[0].guard, 0U);
-    EXPECT_EQ(run.statistics.event_driven.events, 1U);
+    EXPECT_EQ(run.statistics.events, 1U);
 }
 
 TEST(Phases, AResetThatOnlyCountsIsAskedOnce)
@@ -559,6 +560,50 @@ TEST(Phases, ARestartDecidesAsAStart)
     // It falls for a second, and rises for 0.8.
     EXPECT_EQ(simulation.x()[0], 0);
     EXPECT_NEAR(simulation.x()[1], 0.8 - 0.32, tolerance);
+}
+
+/// The block is held from 1 s on.
+[[nodiscard]] auto held_block(const Slider<3>& system)
+{
+    auto simulation = std::make_unique<Simulation<Slider<3>>>(system, Three{1, 1.125, 0}, until(3));
+    while (simulation->t() < 1.8) EXPECT_TRUE(simulation->step());
+    return simulation;
+}
+
+TEST(Phases, ASimulationListsThemAsTheyBegin)
+{
+    const Slider<3> system{.f = fall, .own = {elastic_floor()}};
+    const auto simulation = held_block(system);
+    const std::vector<Phase>& phases = simulation->run().phases;
+    ASSERT_EQ(phases.size(), 2U);
+    EXPECT_NEAR(phases[1].from, 1, tolerance);
+    EXPECT_EQ(phases[1].cause, PhaseCause::held);
+    EXPECT_EQ(simulation->take().phases.size(), 2U);
+}
+
+TEST(Phases, ARestartDropsThoseAfterIt)
+{
+    const Slider<3> system{.f = fall, .own = {elastic_floor()}};
+    const auto simulation = held_block(system);
+    simulation->restart(1.5, Three{2, 0.5, 0});
+    const auto run = simulation->take();
+    ASSERT_EQ(run.phases.size(), 3U);
+    EXPECT_EQ(run.phases[1].cause, PhaseCause::held);
+    EXPECT_EQ(run.phases[2].from, 1.5);
+    EXPECT_EQ(run.phases[2].cause, PhaseCause::start);
+    EXPECT_FALSE(run.phases[2].set_valued);
+}
+
+TEST(Phases, ARefusedRestartOrSnapshotLeavesThem)
+{
+    const Slider<3> system{.f = fall, .own = {elastic_floor()}};
+    const auto simulation = held_block(system);
+    // Behind the floor.
+    EXPECT_NE(refusal([&] { simulation->restart(0.5, Three{2, -1, 0}); }), "accepted");
+    Snapshot start = Simulation(system, Three{1, 1.125, 0}, until(3)).save();
+    start.numbers.push_back(0);
+    EXPECT_NE(refusal([&] { simulation->restore(start); }), "accepted");
+    EXPECT_EQ(simulation->run().phases.size(), 2U);
 }
 
 TEST(Phases, AnyMethodOfTheLibraryFollowsThem)

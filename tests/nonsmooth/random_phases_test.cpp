@@ -76,12 +76,10 @@ void expect_motion_of_inclusion(const State& x, double t, const RandomInclusion<
 /// Each step has an error of at most its tolerance, of which the motion makes at most ten times as
 /// much; a tenth of the tolerance leaves a fifth of it in steps of order two.
 template <int M>
-void expect_errors_of_steps(const MixedRun<State>& run, const WithSawtooth<M>& system,
-                            const State& x0)
+void expect_errors_of_steps(const Run<State>& run, const WithSawtooth<M>& system, const State& x0)
 {
     const State x = integrate(system, x0, options_of(system, 1e-10)).x;
-    const auto steps =
-        static_cast<double>(run.statistics.event_driven.steps + run.statistics.set_valued.accepted);
+    const auto steps = static_cast<double>(run.statistics.steps);
     double size = 1;
     for (const double component : x) size = std::max(size, std::fabs(component));
     for (std::size_t i = 0; i < x.size(); ++i) {

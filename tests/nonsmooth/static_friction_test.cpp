@@ -183,7 +183,7 @@ struct Ticking {
     [[nodiscard]] const Block& set_valued() const { return block; }
 };
 
-MixedRun<std::array<double, 1>> tick(const Ticking& system, double w0, double t_end)
+Run<std::array<double, 1>> tick(const Ticking& system, double w0, double t_end)
 {
     return integrate(system, {w0}, {.t_end = t_end, .rtol = 1e-10, .atol = 1e-12});
 }

@@ -7,39 +7,15 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/phase.hpp"
 #include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {
-
-/// Reason for which a phase began.
-enum class PhaseCause {
-    start,
-    no_modes,       ///< the set is no box, or has more than four reactions
-    no_flow,        ///< y' = 0 does not determine the held reactions
-    several,        ///< changes coincide, and rates do not tell what follows
-    accumulation,   ///< infinitely many switchings in finite time
-    chattering,     ///< more switchings in a short time than can be worth locating
-    stuck,          ///< the event-driven loop could not continue
-    contradiction,  ///< an event-driven step contradicted the law of a reaction
-    released,       ///< event-driven again: every branch is plain
-    held,           ///< a y arrived at zero, and its reaction holds it
-};
-
-/// The enumerator's name.
-[[nodiscard]] std::string_view name(PhaseCause cause) noexcept;
-
-/// Start of a phase of a hand-over, until the next one or the end of the run.
-struct Phase {
-    double from = 0;  ///< [s]
-    bool set_valued = false;
-    PhaseCause cause = PhaseCause::start;
-};
 
 /// Options of a hand-over: times, tolerances of both kinds of phases, and what ends the run.
 struct HandOverOptions {

@@ -78,16 +78,17 @@ public:
 
     [[nodiscard]] HandOverRun<System> take()
     {
-        const Run<C> done = run_->loop().take();
+        Run<C> done = run_->loop().take();
         const EndInBranches end = run_->end_in_branches();
         HandOverRun<System> out;
         out.outcome = done.outcome;
         out.state = {done.t, vector(done.x),
                      Eigen::Map<const ReactionOf<System>>(end.reaction.data())};
         out.mode = resized_mode<m, M>(end.mode);
-        out.phases = run_->phases();
-        out.statistics = run_->statistics(done);
-        if (done.outcome == Outcome::not_converged) out.failure = run_->failure();
+        out.statistics =
+            statistics_by_phase({done.statistics, done.set_valued, done.phases, done.t});
+        out.phases = std::move(done.phases);
+        out.failure = done.failure;
         out.trajectory.t = done.trajectory.t;
         for (const C& x : done.trajectory.x) out.trajectory.x.push_back(vector(x));
         out.events.reserve(done.events.size());

@@ -17,6 +17,7 @@
 #include <limits>
 
 #include "ricochet/detail/any_inclusion.hpp"
+#include "ricochet/hybrid/phase.hpp"
 
 namespace ricochet {
 
@@ -32,14 +33,6 @@ struct RICOCHET_ALIGNED Stage {
 };
 
 }  // namespace detail
-
-/// Result of a stage.
-struct StageReport {
-    bool converged = false;
-    double residual = std::numeric_limits<double>::infinity();  ///< see above
-    int iterations = 0;
-    int set = -1;  ///< the component of the reaction whose law failed; -1: the equation
-};
 
 enum class StageMethod {
     automatic,    ///< cases for boxes of up to four reactions, else Newton's method

@@ -64,13 +64,18 @@ public:
     virtual ~PhasedRun() = default;
 
     [[nodiscard]] virtual AnyLoop<C>& loop() noexcept = 0;
-    [[nodiscard]] virtual const std::vector<Phase>& phases() const noexcept = 0;
-    /// The counts of the run, by the kind of phase.
-    [[nodiscard]] virtual HandOverStatistics statistics(const Run<C>& run) const = 0;
-    [[nodiscard]] virtual const StageReport& failure() const noexcept = 0;
     /// Of an inclusion alone, after the end.
     [[nodiscard]] virtual EndInBranches end_in_branches() const = 0;
 };
+
+/// Counts over a run in phases.
+struct PhasedCounts {
+    const Statistics& all;
+    const SetValuedStatistics& implicit;
+    const std::vector<Phase>& phases;
+    double t_end;  ///< [s] of the run
+};
+[[nodiscard]] HandOverStatistics statistics_by_phase(const PhasedCounts& of);
 
 /// What solves the inclusion of a run with these options.
 /// @throws std::invalid_argument for options that a run with phases does not have.

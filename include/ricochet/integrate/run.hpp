@@ -17,6 +17,7 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/hybrid/phase.hpp"
 #include "ricochet/integrate/options.hpp"
 
 namespace ricochet {
@@ -388,7 +389,13 @@ struct Run {
     Trajectory<State> trajectory;  ///< empty unless `Options::sample_times` were given
     Solution<State> solution;      ///< empty without `Options::record_steps`
     std::optional<WrongBound<State>> wrong_bound;  ///< set with `Outcome::wrong_bound`
-    Statistics statistics;
+    Statistics statistics;                         ///< of all steps
+
+    // Of a system with set_valued() (nonsmooth/hand_over.hpp), else empty.
+
+    std::vector<Phase> phases;       ///< where something is held, or followed by implicit steps
+    SetValuedStatistics set_valued;  ///< of the implicit steps alone
+    StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
 };
 
 namespace detail {

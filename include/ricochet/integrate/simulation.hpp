@@ -162,21 +162,34 @@ private:
     Locator locator_;
 };
 
-/// Drops records that an exception has undone.
-template <class X>
-void drop_beyond(Run<X>& run, std::size_t events, std::size_t samples, std::size_t pieces)
+/// Drops records that are no longer in `run`: an exception, a restart or a snapshot has undone
+/// them.
+template <class X, class C>
+void drop_undone(Run<X>& to, const Run<C>& run)
 {
     const auto shorten = [](auto& records, std::size_t size) {
         if (records.size() <= size) return;
         records.erase(records.begin() + static_cast<std::ptrdiff_t>(size), records.end());
     };
-    shorten(run.events, events);
-    shorten(run.trajectory.t, samples);
-    shorten(run.trajectory.x, samples);
-    if (run.solution.size() > pieces) run.solution.shrink(pieces);
+    shorten(to.events, run.events.size());
+    shorten(to.trajectory.t, run.trajectory.t.size());
+    shorten(to.trajectory.x, run.trajectory.x.size());
+    shorten(to.phases, run.phases.size());
+    if (to.solution.size() > run.solution.size()) to.solution.shrink(run.solution.size());
 }
 
-/// Brings `to` up to date with the records in `run`, converting only the new ones.
+/// Adds what is new in a run with phases.
+template <class X, class C>
+void update_phases(Run<X>& to, const Run<C>& run)
+{
+    to.phases.insert(to.phases.end(),
+                     run.phases.begin() + static_cast<std::ptrdiff_t>(to.phases.size()),
+                     run.phases.end());
+    to.set_valued = run.set_valued;
+    to.failure = run.failure;
+}
+
+/// Brings `to` up to date with `run`, converting only the records that are new.
 template <class X>
 void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
 {
@@ -190,7 +203,7 @@ void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
     to.reason = run.reason;
     to.armed_beyond = run.armed_beyond;
     to.statistics = run.statistics;
-    drop_beyond(to, run.events.size(), run.trajectory.x.size(), run.solution.size());
+    if (!run.phases.empty()) update_phases(to, run);
     if (to.events.empty()) to.events.reserve(run.events.size());
     for (std::size_t i = to.events.size(); i < run.events.size(); ++i) {
         to.events.push_back(as_callers(run.events[i], like));
@@ -403,7 +416,7 @@ public:
             return loop_->run();
         } else {
             shown_.asked_run = true;
-            detail::update(shown_.run, loop_->run(), shown_.x);
+            update_run();
             return shown_.run;
         }
     }
@@ -523,8 +536,13 @@ private:
     {
         if constexpr (!same) {
             if (shown_.asked) detail::copy_state(loop_->x(), shown_.x);
-            if (shown_.asked_run) detail::update(shown_.run, loop_->run(), shown_.x);
+            if (shown_.asked_run) update_run();
         }
+    }
+    void update_run() const
+    {
+        detail::drop_undone(shown_.run, loop_->run());
+        detail::update(shown_.run, loop_->run(), shown_.x);
     }
 
     template <class Observer>

@@ -94,11 +94,14 @@ namespace ricochet {
 //
 //     set_valued()         an Inclusion (inclusion.hpp) of the same state; or, with modes,
 //     set_valued(mode)     one for each mode, or a std::optional that is empty where a mode has
-//     none start_mode(mode, t, x)  the mode in which its own flow continues from (t, x) after the
-//                          inclusion of `mode`; also start_mode(t, x). By default `mode`, which
-//                          only set_valued(mode) allows
+//     none
+//
+//     start_mode(mode, t, x)       the mode in which its own flow continues from (t, x) after the
+//                                  inclusion of `mode`; also start_mode(t, x). By default `mode`,
+//                                  which only set_valued(mode) allows
 //     change(k, kind, mode, t, x)  the reset of a stick, slip or mode of reaction k: may change x,
-//                          and returns the next mode; without modes void change(k, kind, t, x)
+//                                  and returns the next mode; without modes
+//                                  void change(k, kind, t, x)
 //
 // `integrate` and `Simulation` then follow the system's own flow while every y is clear of zero,
 // farther from it than 1000 (atol + rtol |w|) over the components that y reads, and the inclusion
@@ -107,6 +110,10 @@ namespace ricochet {
 // stands for that reaction: its event is then a `stick`, a `mode` or a `touch` of the reaction.
 // Where changes of reactions accumulate, chatter or contradict one another, implicit steps are
 // taken.
+//
+// `Run::phases` lists where something is held, or followed by implicit steps. A `stick`, `mode` or
+// `touch` has the lowest guard that stands for the reaction among those that fired, or none, a
+// `slip` has none, and `Event::reaction` is the reaction.
 //
 // Boxes of more than four reactions are followed by implicit steps wherever some y is not clear of
 // zero, and sets that are no boxes of reactions everywhere; one that is unbounded along some axis
@@ -118,25 +125,6 @@ template <class System>
 concept KnowsInclusion = requires
 {
     requires Inclusion<detail::InclusionOf<System>>;
-};
-
-/// Result of a run. A `stick`, `mode` or `touch` has the lowest guard that stands for the reaction
-/// among those that fired, or none, a `slip` has none, and `Event::reaction` is the reaction.
-template <class X>
-struct MixedRun {
-    Outcome outcome = Outcome::reached_end;
-    double t = 0;
-    X x{};
-    Mode mode = 0;
-    /// As in `Run`: the guard that ended the run, and the other one of two that conflict.
-    std::size_t guard = no_guard, other_guard = no_guard;
-    std::string reason;  ///< text of the `StopRun` that ended the run
-    std::vector<Event<X>> events;
-    std::vector<Phase> phases;
-    Trajectory<X> trajectory;  ///< at the sample times
-    Solution<X> solution;      ///< with `Options::record_steps`
-    HandOverStatistics statistics;
-    StageReport failure;  ///< set with `not_converged`
 };
 
 namespace detail {
@@ -160,7 +148,6 @@ public:
     {
     }
     [[nodiscard]] AnyLoop<C>* operator->() const noexcept { return &run_->loop(); }
-    [[nodiscard]] const PhasedRun<C>& phased() const noexcept { return *run_; }
 
 private:
     template <class Parts>
@@ -224,34 +211,6 @@ private:
     Owner<PhasedRun<C>> run_;
 };
 
-/// A whole run in phases.
-template <class System, class X, class Stepping, class Detector, class Locator>
-[[nodiscard]] MixedRun<X> run_in_phases(const System& system, const X& x0, const Options& options,
-                                        const Stepping& stepping, const Detector& detector,
-                                        const Locator& locator)
-{
-    PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
-                                                             locator);
-    const LoopOf<System, X, Stepping, Detector> loop(system, parts, x0, options);
-    Run<CoreState<X>> done = loop->take();
-    MixedRun<X> out;
-    out.phases = loop.phased().phases();
-    out.statistics = loop.phased().statistics(done);
-    if (done.outcome == Outcome::not_converged) out.failure = loop.phased().failure();
-    Run<X> run = as_callers<X>(std::move(done), x0);
-    out.outcome = run.outcome;
-    out.t = run.t;
-    out.x = run.x;
-    out.mode = run.mode;
-    out.guard = run.guard;
-    out.other_guard = run.other_guard;
-    out.reason = std::move(run.reason);
-    out.events = std::move(run.events);
-    out.trajectory = std::move(run.trajectory);
-    out.solution = std::move(run.solution);
-    return out;
-}
-
 /// Whether the library of inclusions is linked: its target defines RICOCHET_WITH_NONSMOOTH.
 template <class>
 inline constexpr bool nonsmooth_is_linked =
@@ -270,14 +229,17 @@ inline constexpr bool nonsmooth_is_linked =
 template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
-[[nodiscard]] MixedRun<X> integrate(const System& system, const X& x0, const Options& options,
-                                    const Stepping& stepping = {}, const Detector& detector = {},
-                                    const Locator& locator = {})
+[[nodiscard]] Run<X> integrate(const System& system, const X& x0, const Options& options,
+                               const Stepping& stepping = {}, const Detector& detector = {},
+                               const Locator& locator = {})
 {
     static_assert(detail::nonsmooth_is_linked<System>,
                   "ricochet: found a system with set_valued(), and a target that does not link "
                   "ricochet::nonsmooth; expected it to, or RICOCHET_WITH_NONSMOOTH to be defined");
-    return detail::run_in_phases(system, x0, options, stepping, detector, locator);
+    detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
+                                                                     locator);
+    const detail::LoopOf<System, X, Stepping, Detector> loop(system, parts, x0, options);
+    return detail::as_callers<X>(loop->take(), x0);
 }
 
 /// Runs an inclusion alone: `hand_over`.

@@ -71,17 +71,6 @@ struct SetValuedOptions {
 /// Validates options. @throws std::invalid_argument naming the option, what was given and expected.
 void validate(const SetValuedOptions& options);
 
-/// Counts over one set-valued motion.
-struct SetValuedStatistics {
-    std::uint64_t attempted = 0;
-    std::uint64_t accepted = 0;
-    std::uint64_t rejected = 0;    ///< steps rejected by the controller
-    std::uint64_t unsolved = 0;    ///< attempts whose stages did not converge
-    std::uint64_t stages = 0;      ///< stages solved, whether or not their step was accepted
-    std::uint64_t iterations = 0;  ///< iterations of the stages' solvers
-    std::uint64_t switches = 0;    ///< changes of branch that were located
-};
-
 namespace detail {
 
 /// Whether a step of length h [s] from t is the last: where `steps` steps have led to t, only their

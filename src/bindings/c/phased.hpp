@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <utility>
-#include <vector>
 
 #include "bindings/c/callback_table.hpp"
 #include "bindings/c/inclusion.hpp"
@@ -13,16 +12,6 @@
 #include "ricochet/detail/phased_run.hpp"
 
 namespace ricochet::c {
-
-template <class X>
-[[nodiscard]] std::vector<ShownPhase> shown_phases(const detail::PhasedRun<X>& run)
-{
-    std::vector<ShownPhase> out;
-    for (const Phase& phase : run.phases()) {
-        out.push_back({phase.from, phase.set_valued, static_cast<int>(phase.cause)});
-    }
-    return out;
-}
 
 #ifdef RICOCHET_WITH_NONSMOOTH
 

@@ -40,13 +40,13 @@ void write_event(rc_event* event, const ShownEvent& from)
                  "rc_event");
 }
 
-void write_phase(rc_phase* phase, const ShownPhase& from)
+void write_phase(rc_phase* phase, const Phase& from)
 {
     write_struct(phase,
                  {.size = sizeof *phase,
                   .from = from.from,
                   .set_valued = from.set_valued,
-                  .cause = from.cause},
+                  .cause = static_cast<std::int32_t>(from.cause)},
                  "rc_phase");
 }
 

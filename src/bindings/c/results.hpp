@@ -41,13 +41,6 @@ template <class X>
             .reaction = event.reaction};
 }
 
-/// A phase of a run with set-valued motion.
-struct ShownPhase {
-    double from = 0;
-    bool set_valued = false;
-    int cause = 0;
-};
-
 struct Counts {
     Statistics statistics;
     std::size_t guard = no_guard, other_guard = no_guard;
@@ -55,7 +48,7 @@ struct Counts {
 
 // All of these throw Refusal if the struct is invalid.
 void write_event(rc_event* event, const ShownEvent& from);
-void write_phase(rc_phase* phase, const ShownPhase& from);
+void write_phase(rc_phase* phase, const Phase& from);
 void write_statistics(rc_statistics* statistics, const Counts& from);
 void write_failure(rc_callback_error* error, const CallbackFailed& from);
 

@@ -46,7 +46,7 @@ public:
     [[nodiscard]] virtual bool keeps_steps() const noexcept = 0;
     virtual void solution(double t, bool before, double* x) const = 0;
     [[nodiscard]] virtual Mode solution_mode(double t) const = 0;
-    [[nodiscard]] virtual const std::vector<ShownPhase>& phases() = 0;
+    [[nodiscard]] virtual const std::vector<Phase>& phases() const noexcept = 0;
     [[nodiscard]] virtual std::string save() = 0;
     virtual void restore(std::string_view text) = 0;
     virtual void restart(double t, const double* x, Mode mode) = 0;

@@ -95,10 +95,9 @@ public:
     {
         return loop_->run().solution.mode(t);
     }
-    [[nodiscard]] const std::vector<ShownPhase>& phases() override
+    [[nodiscard]] const std::vector<Phase>& phases() const noexcept override
     {
-        shown_phases_ = phased_ ? shown_phases(*phased_) : std::vector<ShownPhase>();
-        return shown_phases_;
+        return loop_->run().phases;
     }
     [[nodiscard]] std::string save() override { return to_text(loop_->save()); }
     void restore(std::string_view text) override
@@ -149,7 +148,6 @@ private:
     detail::Owner<detail::AnyLoop<X>> own_;  ///< null with set-valued motion
     detail::Owner<detail::PhasedRun<X>> phased_;
     detail::AnyLoop<X>* loop_ = nullptr;  ///< of either
-    std::vector<ShownPhase> shown_phases_;
     X like_;
 };
 

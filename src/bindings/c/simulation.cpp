@@ -258,12 +258,12 @@ rc_status rc_event_at(rc_simulation* simulation, size_t index, rc_event* event)
 size_t rc_phase_count(rc_simulation* simulation)
 {
     return value_of(simulation, std::size_t{0},
-                    [](rc_simulation& at) { return at.run->phases().size(); });
+                    [](const rc_simulation& at) { return at.run->phases().size(); });
 }
 
 rc_status rc_phase_at(rc_simulation* simulation, size_t index, rc_phase* phase)
 {
-    return with(simulation, [&](rc_simulation& at) {
+    return with(simulation, [&](const rc_simulation& at) {
         const auto& phases = at.run->phases();
         require_index("phase", index, phases.size());
         write_phase(phase, phases[index]);

@@ -32,13 +32,6 @@ struct EventHead {
 };
 static_assert(sizeof(EventHead) == 64);
 
-/// A phase of a run with set-valued motion.
-struct PhaseRecord {
-    double from = 0;
-    bool set_valued = false;
-    std::string cause;
-};
-
 struct Record {
     Outcome outcome = Outcome::reached_end;
     double t = 0;
@@ -56,7 +49,7 @@ struct Record {
     std::string wrong_bound;                    ///< sentence about a violated bound
     std::string reason;                         ///< text of the `Stop` that ended the run
     std::vector<std::size_t> armed_beyond;      ///< guards that began beyond their surface
-    std::vector<PhaseRecord> phases;            ///< of a system with set-valued motion
+    std::vector<Phase> phases;                  ///< of a system with set-valued motion
 
     [[nodiscard]] std::size_t event_stride() const noexcept
     {
@@ -95,6 +88,7 @@ template <class X>
     out.statistics = run.statistics;
     out.reason = run.reason;
     out.armed_beyond = run.armed_beyond;
+    out.phases = run.phases;
     out.event_count = run.events.size();
     out.events.resize(out.event_count * out.event_stride());
     double* at = out.events.data();

@@ -130,11 +130,21 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     return out;
 }
 
-[[nodiscard]] py::list listed(const std::vector<PhaseRecord>& phases)
+[[nodiscard]] py::list listed(const std::vector<Phase>& phases)
 {
     py::list out;
-    for (const PhaseRecord& phase : phases) {
-        out.append(py::make_tuple(phase.from, phase.set_valued, phase.cause));
+    for (const Phase& phase : phases) {
+        const std::string cause(name(phase.cause));
+        out.append(py::make_tuple(phase.from, phase.set_valued, cause));
+    }
+    return out;
+}
+
+[[nodiscard]] py::list pickled(const std::vector<Phase>& phases)
+{
+    py::list out;
+    for (const Phase& phase : phases) {
+        out.append(py::make_tuple(phase.from, phase.set_valued, static_cast<int>(phase.cause)));
     }
     return out;
 }
@@ -147,7 +157,7 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         std::bit_cast<Counts>(r.statistics), r.width, r.event_count, bytes_of(r.events),
         bytes_of(r.times), bytes_of(r.states), r.wrong_bound,
         r.solution ? py::object(pickled(PySolution{r.solution})) : py::object(py::none()),
-        self.modes, self.guard_names, r.reason, r.armed_beyond, listed(r.phases));
+        self.modes, self.guard_names, r.reason, r.armed_beyond, pickled(r.phases));
 }
 
 [[nodiscard]] PyRun run_from(const py::tuple& state)
@@ -178,8 +188,8 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     r.armed_beyond = py::cast<std::vector<std::size_t>>(state[17]);
     for (const py::handle phase : py::cast<py::list>(state[18])) {
         const py::tuple of = py::cast<py::tuple>(phase);
-        r.phases.push_back(
-            {py::cast<double>(of[0]), py::cast<bool>(of[1]), py::cast<std::string>(of[2])});
+        r.phases.push_back({py::cast<double>(of[0]), py::cast<bool>(of[1]),
+                            static_cast<PhaseCause>(py::cast<int>(of[2]))});
     }
     return out;
 }

@@ -106,18 +106,6 @@ RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunDoor& door,
 #endif
 }
 
-std::vector<PhaseRecord> RunLoop::phases() const
-{
-    std::vector<PhaseRecord> out;
-    if (!phased_) return out;
-#ifdef RICOCHET_WITH_NONSMOOTH
-    for (const Phase& phase : phased_->phases()) {
-        out.push_back({phase.from, phase.set_valued, std::string(ricochet::name(phase.cause))});
-    }
-#endif
-    return out;
-}
-
 OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door)
 {
     OwnedSetup out;

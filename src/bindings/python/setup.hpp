@@ -37,7 +37,6 @@ public:
     [[nodiscard]] explicit operator bool() const noexcept { return loop_ != nullptr; }
     [[nodiscard]] detail::AnyLoop<State>& operator*() const noexcept { return *loop_; }
     [[nodiscard]] detail::AnyLoop<State>* operator->() const noexcept { return loop_; }
-    [[nodiscard]] std::vector<PhaseRecord> phases() const;
 
 private:
     detail::Owner<detail::AnyLoop<State>> own_;

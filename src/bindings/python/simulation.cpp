@@ -108,11 +108,9 @@ PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& r
         work_freely(door->is_free(), [&] { drive(*loop, kept); });
     } catch (const PythonError& error) {
         out.record = loop ? record_of(loop->finish(), kept) : start_of(x0, request.options);
-        out.record.phases = loop.phases();
         raise_with(error, std::move(out));
     }
     out.record = record_of(loop->finish(), kept);
-    out.record.phases = loop.phases();
     if (door->watch().raised()) raise_with(*door->watch().raised(), std::move(out));
     return out;
 }
@@ -218,7 +216,6 @@ public:
         if (!finished_) {
             finished_.emplace(names_);
             finished_->record = record_of(Run<State>(loop_->bring_up_to_date()));
-            finished_->record.phases = loop_.phases();
             may_go_on_ = true;
         }
         return *finished_;
@@ -229,7 +226,6 @@ public:
         if (!finished_) {
             finished_.emplace(names_);
             finished_->record = record_of(loop_->finish());
-            finished_->record.phases = loop_.phases();
         }
         may_go_on_ = false;
         return *finished_;
@@ -275,7 +271,6 @@ public:
         run.mode = loop_->mode();
         if (!loop_->ended()) run.outcome = Outcome::cancelled;
         out.record = record_of(std::move(run));
-        out.record.phases = loop_.phases();
         return out;
     }
 
@@ -330,7 +325,6 @@ private:
     {
         finished_.emplace(names_);
         finished_->record = record_of(loop_->finish());
-        finished_->record.phases = loop_.phases();
         raise_with(error, PyRun(*finished_));
     }
 
