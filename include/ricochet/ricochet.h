@@ -552,6 +552,14 @@ RC_API size_t rc_sample_count(rc_simulation* simulation);
  *  into `x`; either may be null. RC_INVALID if there is none. */
 RC_API rc_status rc_sample_at(rc_simulation* simulation, size_t index, double* t, const double** x);
 
+/** The reactions of a system with set_valued at rc_time, after the events there: `m` doubles until
+ *  the next call with this simulation. m is 0 where the mode has no inclusion, and in systems
+ *  without; NaN: none follows from the state. */
+RC_API rc_status rc_reaction(rc_simulation* simulation, const double** r, size_t* m);
+/** The same at sample `index`, until the simulation continues. RC_INVALID if there is none. */
+RC_API rc_status rc_reaction_at(rc_simulation* simulation, size_t index, const double** r,
+                                size_t* m);
+
 /** The state at time t [s], after an event at t, into x, n doubles, where `record_steps` is set:
  *  before the first and after the last step the nearest state. RC_INVALID if no step was kept, n is
  *  not the dimension or t is NaN. */

@@ -139,8 +139,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         ``y_events`` are the states before resets. At a reset ``t`` holds its time twice where ``t_eval``
         is not given. New: ``y_events_after``, the states after; ``kinds``, for every event
         'crossing', 'touch', 'jump', 'accumulation', 'mode' or, of a guard that stands for a reaction,
-        'stick'; ``modes``, before and after; ``phases`` of a system with ``set_valued``; ``outcome``
-        and ``statistics``, whose ``evidence`` counts why steps were taken to hold no event.
+        'stick'; ``modes``, before and after; ``phases`` of a system with ``set_valued``, and its
+        ``reactions`` at ``t``, in columns; ``outcome`` and ``statistics``, whose ``evidence`` counts why steps were taken to hold no event.
 
     If ``fun`` or an event raises an exception, it is passed on unchanged, with the `Run` so far as
     its attribute ``ricochet_run``.
@@ -372,7 +372,7 @@ def _result(run, count, dense_output, events_given):
                         if run.modes else np.zeros((which.size, 2), np.uint32)
                         for which in chosen]
     result.update(outcome=run.outcome, statistics=statistics, guard=run.guard, phases=run.phases,
-                  run=run)
+                  reactions=run.reactions.T, run=run)
     return result
 
 
@@ -386,4 +386,4 @@ def _nothing(t, y, samples, dense_output, count):
                      message=_MESSAGES["reached_end"], success=True, y_events_after=no_events,
                      kinds=None if count is None else [[] for _ in range(count)],
                      modes=no_events, outcome="reached_end", statistics=None, guard=None, phases=[],
-                     run=None)
+                     reactions=np.empty((0, t_out.size)), run=None)

@@ -112,6 +112,7 @@ public:
         }
         return this->shown(step_.mode());
     }
+    [[nodiscard]] std::vector<double> reaction() const override;
     [[nodiscard]] bool ended() const noexcept override { return ended_; }
     /// Result so far; `finish` brings its time and state up to date.
     [[nodiscard]] const Run<X>& run() const noexcept override { return run_; }
@@ -281,6 +282,13 @@ private:
 
     /// What `advance` has stopped at.
     enum class Showing : std::uint8_t { step, sample, event };
+
+    /// Start of the step whose events `advance` shows, of a run with phases.
+    struct ShownStep {
+        Mode mode = 0;
+        double t = 0;
+        X x{};
+    };
 
     /// Shows the next sample or recorded event that lies in the steps taken, if there is one.
     [[nodiscard]] bool show_next();
@@ -679,7 +687,14 @@ private:
     /// Samples at the time at which the run has ended.
     void emit_last_samples();
 
-    void add_sample(X&& x);
+    /// @param offset  [s] in the step
+    void add_sample(X&& x, double offset);
+    /// Adds the reactions of a sample.
+    void add_reaction(double t, const X& x, double offset);
+    /// Those at time t, where the state is x: s [s] after the start of a step.
+    [[nodiscard]] std::vector<double> reaction_at(const PhasePlace<X>& place) const;
+    /// Those at the end of the last step.
+    [[nodiscard]] std::vector<double> reaction_here() const;
 
     // --- saving ---
 
@@ -719,6 +734,7 @@ private:
     Showing showing_ = Showing::step;
     bool over_ = false;  ///< the result has been handed out
     Mode sample_mode_ = 0;
+    ShownStep shown_step_;
     StepStart<X> place_;
     std::unique_ptr<Mark> mark_;  ///< null: the run does not continue after an exception
     bool replans_ = false;        ///< all deadlines of guards have to be found again

@@ -21,8 +21,10 @@ void Loop<X, single>::emit_more_samples(double s, double end)
         X x = step_.x0();
         if (offset > 0 && !(starts_at_set() && is_rounding(times[next_sample_], step_.time(0)))) {
             step_.sample(offset, {options_.rtol, options_.atol, on_polynomial}, x);
+            add_sample(std::move(x), offset);
+        } else {
+            add_sample(std::move(x), 0);
         }
-        add_sample(std::move(x));
     }
 }
 
@@ -38,7 +40,7 @@ void Loop<X, single>::emit_sample_with(double t)
 {
     const auto& times = options_.sample_times;
     const bool due = next_sample_ < times.size() && is_rounding(times[next_sample_], t);
-    if (due && step_.start().value == t) add_sample(X(step_.x0()));
+    if (due && step_.start().value == t) add_sample(X(step_.x0()), 0);
 }
 
 template <class X, bool single>
@@ -46,7 +48,7 @@ inline void Loop<X, single>::emit_held_samples(double until)
 {
     const auto& times = options_.sample_times;
     while (next_sample_ < times.size() && lies_before(times[next_sample_], until)) {
-        add_sample(X(step_.x0()));
+        add_sample(X(step_.x0()), 0);
     }
 }
 
@@ -77,8 +79,9 @@ void Loop<X, single>::record_restart()
 }
 
 template <class X, bool single>
-inline void Loop<X, single>::add_sample(X&& x)
+inline void Loop<X, single>::add_sample(X&& x, double offset)
 {
+    if (phases_ && phases_->reaction) add_reaction(options_.sample_times[next_sample_], x, offset);
     run_.trajectory.t.push_back(options_.sample_times[next_sample_]);
     run_.trajectory.x.push_back(std::move(x));
     sample_mode_ = this->shown(step_.mode());

@@ -29,6 +29,41 @@ void Loop<X, single>::review_phase(bool has_advanced)
     }
     if (this->is_of_phases(run_.guard)) run_.guard = no_guard;
     if (this->is_of_phases(run_.other_guard)) run_.other_guard = no_guard;
+    if (ended_ && phases_->reaction) run_.reaction = reaction_here();
+}
+
+template <class X, bool single>
+std::vector<double> Loop<X, single>::reaction_at(const PhasePlace<X>& place) const
+{
+    std::vector<double> r;
+    phases_->reaction(system_.door(), place, r);
+    return r;
+}
+
+template <class X, bool single>
+std::vector<double> Loop<X, single>::reaction_here() const
+{
+    const double t = step_.start().value;
+    return reaction_at({step_.mode(), t, step_.x0(), 0, t, step_.x0()});
+}
+
+template <class X, bool single>
+std::vector<double> Loop<X, single>::reaction() const
+{
+    if (!phases_ || !phases_->reaction) return {};
+    if (showing_ == Showing::sample) return run_.reactions[shown_samples_ - 1];
+    if (showing_ == Showing::step) return reaction_here();
+    const ShownStep& step = shown_step_;
+    return reaction_at({step.mode, step.t, step.x, t() - step.t, t(), x()});
+}
+
+template <class X, bool single>
+void Loop<X, single>::add_reaction(double t, const X& x, double offset)
+{
+    // A run that has ended stays where it is, and none of its functions is called any more.
+    run_.reactions.push_back(
+        ended_ ? run_.reaction
+               : reaction_at({step_.mode(), step_.start().value, step_.x0(), offset, t, x}));
 }
 
 template <class X, bool single>

@@ -94,6 +94,7 @@ void Loop<X, single>::drop_from(double t)
     while (!samples.t.empty() && lies_before(t, samples.t.back())) {
         samples.t.pop_back();
         samples.x.pop_back();
+        if (!run_.reactions.empty()) run_.reactions.pop_back();
     }
     while (next_sample_ < times.size() && lies_before(times[next_sample_], t)) ++next_sample_;
     run_.solution.cut(t);

@@ -154,6 +154,7 @@ void Loop<X, single>::go_back_to_mark()
     run_.events.resize(mark.events);
     run_.trajectory.t.resize(samples);
     run_.trajectory.x.resize(samples);
+    if (run_.reactions.size() > samples) run_.reactions.resize(samples);
     run_.solution.shrink(pieces);
     run_.outcome = Outcome::reached_end;
     this->forget_cause();

@@ -37,6 +37,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
     }
     go_on_from_place();
     show_all();
+    if (ended_ && phases_ && phases_->reaction) run_.reaction = reaction_here();
 }
 
 template <class X, bool single>

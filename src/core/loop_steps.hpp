@@ -15,6 +15,7 @@ inline bool Loop<X, single>::advance()
             emit_last_samples();
             return show_next();
         }
+        if (phases_) shown_step_ = {step_.mode(), step_.start().value, step_.x0()};
         do {
             advance_one({.to_next_sample = true});
         } while (!ended_ && is_tentative());
@@ -60,7 +61,10 @@ inline void Loop<X, single>::run_to_end()
 template <class X, bool single>
 inline Run<X> Loop<X, single>::finish()
 {
-    if (!ended_) run_.outcome = Outcome::cancelled;
+    if (!ended_) {
+        run_.outcome = Outcome::cancelled;
+        run_.reaction.clear();
+    }
     ended_ = over_ = true;
     showing_ = Showing::step;
     bring_up_to_date();

@@ -64,6 +64,17 @@ struct PhaseStep {
     bool has_advanced;  ///< false: a set, or another change of phase, at the same instant
 };
 
+/// A place s [s] after the start of a step, at which the state is x.
+template <class X>
+struct PhasePlace {
+    Mode mode;
+    double t0;
+    const X& x0;  ///< at the start of the step
+    double s;
+    double t;
+    const X& x;
+};
+
 /// How a run has ended.
 template <class X>
 struct PhaseEnd {
@@ -106,8 +117,10 @@ struct PhaseTable {
     PhaseVerdict (*give_up)(Door, const PhaseEnd<X>&, X& x) = nullptr;
     /// A sentence about the end that the phases have given to the run, or an empty one.
     std::string_view (*reason)(Door) = nullptr;
-    /// Moves the list of phases to `phases`, where it goes on; may be null, as the next one.
+    /// Moves the list of phases to `phases`, where it goes on; may be null, as the two below.
     void (*list_in)(Door, std::vector<Phase>& phases) = nullptr;
+    /// Writes the reactions at a place in the current step, or in one that has just ended.
+    void (*reaction)(Door, const PhasePlace<X>&, std::vector<double>& r) = nullptr;
     /// Adds to the result of the run what the phases know of it.
     void (*complete)(Door, Run<X>& run) = nullptr;
     /// The numbers besides time, mode and state on which the future of the run depends.

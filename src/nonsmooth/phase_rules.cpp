@@ -71,6 +71,31 @@ double PhaseRules::fraction_of_held(Kind kind, double t0, const double* x0, doub
     return fraction > 0 ? fraction : 0.1;
 }
 
+void PhaseRules::reaction(Kind kind, const Place& at, std::vector<double>& r)
+{
+    r.clear();
+    if (!has_inclusion()) return;
+    r.resize(count(), std::numeric_limits<double>::quiet_NaN());
+    if (kind == own) return reaction_of_own(at.t, at.x, r.data());
+    const Mode b = branches_of(kind);
+    if (is_explicit(kind)) return inclusion().reaction(b, at.t, at.x, r.data());
+    if (!is_implicit(kind)) return;
+    inclusion().reaction_in_step({at.t0, at.x0, b, kind == across()}, at.s, r.data());
+}
+
+void PhaseRules::reaction_of_own(double t, const double* x, double* r)
+{
+    inclusion().observe(t, x, observed_.data());
+    const bool clear = inclusion().decides_at_zero() && !inclusion().holds(inclusion().signs(t, x));
+    // The law says which reaction holds a y that is zero although the flow is followed.
+    if (!clear) return inclusion().selected_reaction(t, x, r);
+    inclusion().bounds(t, x, lower_.data(), upper_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        const double bound = observed_[i] > 0 ? lower_[i] : upper_[i];
+        if (std::isfinite(bound)) r[i] = bound;
+    }
+}
+
 GuardInfo PhaseRules::guard_info(std::size_t which) const
 {
     if (!watches_own(which)) return any_.guard_info(in_branches(which));

@@ -120,6 +120,16 @@ public:
     void guard_rates(Kind kind, double t, const double* x, const double* dxdt,
                      std::span<double> rates) const;
 
+    /// A place s [s] after the start of a step, where the state is x.
+    struct Place {
+        double t0;
+        const double* x0;
+        double s, t;
+        const double* x;
+    };
+    /// Writes the reactions there; none without an inclusion, NaN where none follows.
+    void reaction(Kind kind, const Place& at, std::vector<double>& r);
+
     // --- rules ---
 
     /// The kind of phase in which a run starts. @throws InclusionRefused
@@ -280,6 +290,9 @@ private:
         memory_.outcome = static_cast<double>(outcome);
         return over();
     }
+
+    /// The reactions where the system's own flow is followed: at the bounds on the side of y.
+    void reaction_of_own(double t, const double* x, double* r);
 
     void note_changes(const Set& set, Mode before, Kind next, const double* x);
     void note_flutter(const Set& set, Kind next, const double* x);

@@ -775,6 +775,13 @@ void PhasedSystem<C>::make_phases()
         return me.verdict(of, end.mode, end.t, x);
     };
     t.reason = [](void* door) { return std::string_view(at(door).rules_.reason()); };
+    if (!rules_.options().alone) {
+        t.reaction = [](void* door, const PhasePlace<C>& at, std::vector<double>& r) {
+            PhasedSystem& me = PhasedSystem::at(door);
+            me.in(own_mode(at.mode))
+                .reaction(kind_of(at.mode), {at.t0, at.x0.data(), at.s, at.t, at.x.data()}, r);
+        };
+    }
     t.list_in = [](void* door, std::vector<Phase>& phases) { at(door).rules_.list_in(phases); };
     t.complete = [](void* door, Run<C>& run) { at(door).complete(run); };
     t.save = [](void* door, std::vector<double>& memory) {

@@ -155,6 +155,96 @@ static void follows_a_ball_while_a_block_is_held(void)
     }
 }
 
+/* --- reactions: one contact, or two with the bounds 1 and 3, under the load t from rest --- */
+
+static int load_flow(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
+{
+    (void)mode, (void)n;
+    dxdt[0] = t - *(const double*)user * sign_of(x[0]);
+    return 0;
+}
+static int load_smooth(void* user, rc_mode mode, double t, const double* w, double* f, size_t n)
+{
+    (void)user, (void)mode, (void)w, (void)n;
+    f[0] = t;
+    return 0;
+}
+static int contact_bounds(void* user, rc_mode mode, double t, const double* w, size_t n,
+                          double* lower, double* upper, size_t m)
+{
+    size_t i;
+    (void)user, (void)mode, (void)t, (void)w, (void)n;
+    for (i = 0; i < m; ++i) {
+        upper[i] = i == 0 ? 1 : 3;
+        lower[i] = -upper[i];
+    }
+    return 0;
+}
+
+static void gives_the_least_reactions_that_hold(void)
+{
+    const double both[2] = {1, 1}, times[3] = {1, 3, 5}, x0[1] = {0};
+    const double expected[3][2] = {{-0.5, -0.5}, {-1, -2}, {-1, -3}};
+    double friction = 4;
+    const rc_inclusion contacts = {.size = sizeof contacts,
+                                   .reactions = 2,
+                                   .smooth = load_smooth,
+                                   .bounds = contact_bounds,
+                                   .observe = both};
+    const rc_callbacks callbacks = {.size = sizeof callbacks,
+                                    .user = &friction,
+                                    .dimension = 1,
+                                    .flow = load_flow,
+                                    .set_valued = &contacts};
+    rc_options options = options_until(6);
+    rc_system* system;
+    rc_simulation* simulation;
+    const double* r;
+    size_t m, k;
+    options.sample_times = times;
+    options.sample_count = 3;
+    CHECK_STATUS(RC_OK, rc_system_new(&callbacks, &system));
+    CHECK_STATUS(RC_OK, rc_simulation_new(system, x0, 1, &options, &simulation));
+    CHECK_STATUS(RC_OK, rc_reaction(simulation, &r, &m));
+    CHECK(m == 2 && r[0] == 0 && r[1] == 0);
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    CHECK(rc_sample_count(simulation) == 3);
+    for (k = 0; k < 3; ++k) {
+        CHECK_STATUS(RC_OK, rc_reaction_at(simulation, k, &r, &m));
+        CHECK(m == 2);
+        CHECK_NEAR(expected[k][0], r[0]);
+        CHECK_NEAR(expected[k][1], r[1]);
+    }
+    CHECK_REFUSED(RC_INVALID, rc_reaction_at(simulation, 3, &r, &m), "no sample 3");
+    CHECK_REFUSED(RC_INVALID, rc_reaction(simulation, NULL, &m), "rc_reaction");
+    CHECK_STATUS(RC_OK, rc_reaction(simulation, &r, &m));
+    CHECK(m == 2);
+    CHECK_NEAR(-1, r[0]);
+    CHECK_NEAR(-3, r[1]);
+    CHECK_STATUS(RC_OK, rc_simulation_free(simulation));
+    rc_system_free(system);
+}
+
+static void gives_no_reactions_without_set_valued(void)
+{
+    const double times[1] = {0.5};
+    const rc_callbacks callbacks = ball_callbacks();
+    rc_options options = options_until(1);
+    rc_simulation* simulation;
+    const double* r;
+    size_t m = 7;
+    options.sample_times = times;
+    options.sample_count = 1;
+    simulation = start_ball(&callbacks, &options);
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    CHECK_STATUS(RC_OK, rc_reaction(simulation, &r, &m));
+    CHECK(m == 0);
+    m = 7;
+    CHECK_STATUS(RC_OK, rc_reaction_at(simulation, 0, &r, &m));
+    CHECK(m == 0);
+    CHECK_STATUS(RC_OK, rc_simulation_free(simulation));
+}
+
 /* --- E, G and A: two bodies of masses 1 and 2 that rub on each other --- */
 
 static int pair_smooth(void* user, rc_mode mode, double t, const double* w, double* f, size_t n)
@@ -494,6 +584,8 @@ static void refuses_runs_that_cannot_follow(void)
 int main(void)
 {
     follows_a_ball_while_a_block_is_held();
+    gives_the_least_reactions_that_hold();
+    gives_no_reactions_without_set_valued();
     takes_matrices_by_rows();
     changes_the_inclusion_with_the_mode();
     lets_a_ball_rest_and_be_lifted(lifted_change, NULL);

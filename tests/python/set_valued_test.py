@@ -60,6 +60,67 @@ def test_a_block_stops_and_slips_again():
     assert again.phases == run.phases and list(again.events["reaction"]) == [0, 0]
 
 
+def contacts(reactions):
+    """The load t from rest, which contacts with the bounds 1 and 3 hold."""
+    def flow(t, x):
+        return [t - (4 if reactions == 2 else 3) * sign(x[0])]
+
+    ones = np.ones((reactions, 1))
+    bounds = np.array([1.0, 3.0][-reactions:])
+    friction = Inclusion(lambda t, x: [t], lambda t, x: (-bounds, bounds), observe=ones)
+    return System(flow, set_valued=friction)
+
+
+def test_reactions_are_rows_beside_the_states():
+    times = [1, 2, 3, 5]
+    run = ricochet.integrate(contacts(2), [0.0], 6.0, sample_times=times, **FINE)
+    expected = [[-0.5, -0.5], [-1, -1], [-1, -2], [-1, -3]]
+    np.testing.assert_allclose(run.reactions, expected, **CLOSE)
+    np.testing.assert_allclose(run.reaction, [-1, -3], **CLOSE)
+    again = pickle.loads(pickle.dumps(run))
+    np.testing.assert_array_equal(again.reactions, run.reactions)
+    np.testing.assert_array_equal(again.reaction, run.reaction)
+    friction = Inclusion(lambda t, x: [t], lambda t, x: (-3.0, 3.0))
+    for t_eval in times, None:
+        result = ricochet.solve_ivp(lambda t, x: [t - 3 * sign(x[0])], (0, 6), [0.0], t_eval=t_eval,
+                                    set_valued=friction, **FINE)
+        held = result.t < 3
+        assert result.reactions.shape == (1, result.t.size) and held.sum() > 1
+        np.testing.assert_allclose(result.reactions[0], np.where(held, -result.t, -3), **CLOSE)
+
+
+def test_a_simulation_gives_its_reaction():
+    simulation = ricochet.Simulation(contacts(1), [0.0], 6.0, sample_times=[1, 2], **FINE)
+    shown = []
+    while simulation.advance():
+        shown.append((simulation.t, simulation.reaction[0]))
+    np.testing.assert_allclose(shown, [(1, -1), (2, -2), (3, -3)], **CLOSE)
+    run = simulation.run_to_end()
+    np.testing.assert_allclose(run.reaction, [-3], **CLOSE)
+    np.testing.assert_array_equal(simulation.reaction, run.reaction)
+
+
+def test_reactions_are_nan_in_modes_without_an_inclusion_and_none_without_set_valued():
+    friction = Inclusion(lambda mode, t, x: [0.5], lambda mode, t, x: (-1.0, 1.0), in_modes=["on"])
+
+    class Brake(System):
+        modes = "on", "off"
+        set_valued = friction
+        time_events = [1.0]
+
+        def flow(self, mode, t, x):
+            return [0.5 - (sign(x[0]) if mode == "on" else 0)]
+
+        def time_reset(self, mode, t, x):
+            return "off", x
+
+    run = ricochet.integrate(Brake(), [0.0], 2.0, sample_times=[0.5, 1.5], **FINE)
+    np.testing.assert_allclose(run.reactions, [[-0.5], [np.nan]], **CLOSE)
+    assert run.reaction.shape == (0,)
+    plain = ricochet.integrate(System(lambda t, x: -x), [1.0], 1.0, sample_times=[0.5])
+    assert plain.reactions.shape == (1, 0) and plain.reaction.shape == (0,)
+
+
 def test_a_ball_meets_its_floor_while_a_block_is_held():
     friction = Inclusion(lambda t, y: [0, y[2], -1], unit)
 

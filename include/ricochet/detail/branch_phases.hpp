@@ -140,6 +140,11 @@ public:
     /// The reactions in branches b; at the end of the last implicit step.
     virtual void reaction(Mode b, double t, const double* x, double* r) const = 0;
     virtual void reaction_of_step(double* r) const = 0;
+    /// Those that the motion selects at (t, x); NaN where there are none.
+    virtual void selected_reaction(double t, const double* x, double* r) = 0;
+    /// Those at the end of an implicit step of length s, or at its start: the least of all that
+    /// have the same effect.
+    virtual void reaction_in_step(const ImplicitStart& from, double s, double* r) = 0;
     /// y' of reaction i.
     [[nodiscard]] virtual double rate_of(std::size_t i, const double* dxdt) const = 0;
     /// The fraction of a step that would follow the held reactions; 1 if the step does, and

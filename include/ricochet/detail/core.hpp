@@ -53,6 +53,8 @@ public:
     [[nodiscard]] virtual double t() const noexcept = 0;
     [[nodiscard]] virtual const X& x() const noexcept = 0;
     [[nodiscard]] virtual Mode mode() const noexcept = 0;
+    /// Reactions at t; may call functions of the system.
+    [[nodiscard]] virtual std::vector<double> reaction() const = 0;
     [[nodiscard]] virtual bool ended() const noexcept = 0;
     [[nodiscard]] virtual const Run<X>& run() const noexcept = 0;
     [[nodiscard]] virtual MeterReading meter() const = 0;

@@ -13,6 +13,7 @@
 
 #include "ricochet/detail/branch_phases.hpp"
 #include "ricochet/detail/law.hpp"
+#include "ricochet/detail/least_reaction.hpp"
 #include "ricochet/detail/minimal_selection.hpp"
 
 namespace ricochet::detail {
@@ -189,6 +190,29 @@ public:
     }
     void reaction(Mode, double, const double*, double* r) const override { reaction_of_step(r); }
     void reaction_of_step(double* r) const override { write(to_.reaction, r, reactions()); }
+    void selected_reaction(double t, const double* x, double* r) override
+    {
+        probe_.t = t;
+        probe_.w = vector(x);
+        if (!select(probe_)) probe_.reaction.setConstant(std::numeric_limits<double>::quiet_NaN());
+        write(probe_.reaction, r, reactions());
+    }
+    void reaction_in_step(const ImplicitStart& from, double s, double* r) override
+    {
+        if (s > 0) {
+            std::vector<double> end(2 * size());
+            take_to(from, s, s, {end.data(), end.data() + size()});
+        } else {
+            place(from);
+            probe_ = from_;
+        }
+        if (probe_.w.allFinite()) {
+            choose_least(probe_);
+        } else {
+            probe_.reaction.setConstant(std::numeric_limits<double>::quiet_NaN());
+        }
+        write(probe_.reaction, r, reactions());
+    }
     [[nodiscard]] double rate_of(std::size_t i, const double* dxdt) const override
     {
         double rate = 0;
@@ -402,6 +426,28 @@ protected:
         }
     }
 
+    /// Replaces the reaction by the least of all with the same effect that satisfy the law, for
+    /// boxes of at most 64.
+    void choose_least(State& at)
+    {
+        const auto& m = matrices();
+        if (!decides_at_zero() || m.own_reactions() > 64) return;
+        if (!knows_least_) {
+            least_ = LeastReaction<M>(m.act(), m.own_reactions());
+            knows_least_ = true;
+        }
+        if (!least_.depend()) return;
+        Reaction lower = at.reaction, upper = at.reaction, y, s;
+        m.inclusion().bounds(at.t, at.w, lower, upper);
+        m.observed(at.t, at.w, y);
+        m.offset(at.t, s);
+        const Reaction terms = times(m.observe().cwiseAbs(), at.w.cwiseAbs()) + s.cwiseAbs();
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            if (std::abs(y[i]) > 1e-12 * terms[i]) lower[i] = upper[i] = at.reaction[i];
+        }
+        least_.choose(lower, upper, at.reaction);
+    }
+
     BranchPhasesOptions options_;
     AnyStep<N, M> step_;
     Eigen::Index own_size_;
@@ -410,6 +456,8 @@ protected:
     Vector error_;      ///< of the last step
     std::uint64_t attempts_ = 0, stages_ = 0;
     StageReport failure_;
+    LeastReaction<M> least_;
+    bool knows_least_ = false;
 
 private:
     /// How far the set reaches along axis i, in the direction of `sign`.

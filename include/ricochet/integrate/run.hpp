@@ -396,6 +396,10 @@ struct Run {
     std::vector<Phase> phases;       ///< where something is held, or followed by implicit steps
     SetValuedStatistics set_valued;  ///< of the implicit steps alone
     StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
+    /// The reactions at the end of a run that has ended by itself, after its events: empty where
+    /// the mode has no inclusion, NaN where none follows from the state.
+    std::vector<double> reaction;
+    std::vector<std::vector<double>> reactions;  ///< the same at the sample times
 };
 
 namespace detail {

@@ -175,6 +175,7 @@ void drop_undone(Run<X>& to, const Run<C>& run)
     shorten(to.trajectory.t, run.trajectory.t.size());
     shorten(to.trajectory.x, run.trajectory.x.size());
     shorten(to.phases, run.phases.size());
+    shorten(to.reactions, run.reactions.size());
     if (to.solution.size() > run.solution.size()) to.solution.shrink(run.solution.size());
 }
 
@@ -182,11 +183,15 @@ void drop_undone(Run<X>& to, const Run<C>& run)
 template <class X, class C>
 void update_phases(Run<X>& to, const Run<C>& run)
 {
-    to.phases.insert(to.phases.end(),
-                     run.phases.begin() + static_cast<std::ptrdiff_t>(to.phases.size()),
-                     run.phases.end());
+    const auto add = [](auto& records, const auto& all) {
+        records.insert(records.end(), all.begin() + static_cast<std::ptrdiff_t>(records.size()),
+                       all.end());
+    };
+    add(to.phases, run.phases);
+    add(to.reactions, run.reactions);
     to.set_valued = run.set_valued;
     to.failure = run.failure;
+    to.reaction = run.reaction;
 }
 
 /// Brings `to` up to date with `run`, converting only the records that are new.
@@ -408,6 +413,9 @@ public:
         }
     }
     [[nodiscard]] Mode mode() const noexcept { return loop_->mode(); }
+    /// The reactions of a system with set_valued() at `t`, after the events there; empty where the
+    /// mode has no inclusion, NaN where none follows.
+    [[nodiscard]] std::vector<double> reaction() const { return loop_->reaction(); }
     [[nodiscard]] bool ended() const noexcept { return loop_->ended(); }
     /// Result so far; `finish` brings its time and state up to date.
     [[nodiscard]] const Run<X>& run() const

@@ -47,6 +47,10 @@ public:
     virtual void solution(double t, bool before, double* x) const = 0;
     [[nodiscard]] virtual Mode solution_mode(double t) const = 0;
     [[nodiscard]] virtual const std::vector<Phase>& phases() const noexcept = 0;
+    /// At the present time, until it is asked again.
+    [[nodiscard]] virtual const std::vector<double>& reaction() = 0;
+    /// One for each sample; none without set-valued motion.
+    [[nodiscard]] virtual const std::vector<std::vector<double>>& reactions() const noexcept = 0;
     [[nodiscard]] virtual std::string save() = 0;
     virtual void restore(std::string_view text) = 0;
     virtual void restart(double t, const double* x, Mode mode) = 0;

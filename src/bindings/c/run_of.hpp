@@ -99,6 +99,14 @@ public:
     {
         return loop_->run().phases;
     }
+    [[nodiscard]] const std::vector<double>& reaction() override
+    {
+        return reaction_ = loop_->reaction();
+    }
+    [[nodiscard]] const std::vector<std::vector<double>>& reactions() const noexcept override
+    {
+        return loop_->run().reactions;
+    }
     [[nodiscard]] std::string save() override { return to_text(loop_->save()); }
     void restore(std::string_view text) override
     {
@@ -148,6 +156,7 @@ private:
     detail::Owner<detail::AnyLoop<X>> own_;  ///< null with set-valued motion
     detail::Owner<detail::PhasedRun<X>> phased_;
     detail::AnyLoop<X>* loop_ = nullptr;  ///< of either
+    std::vector<double> reaction_;        ///< that was asked for last
     X like_;
 };
 

@@ -286,6 +286,34 @@ rc_status rc_sample_at(rc_simulation* simulation, size_t index, double* t, const
     });
 }
 
+rc_status rc_reaction(rc_simulation* simulation, const double** r, size_t* m)
+{
+    return with(simulation, [&](rc_simulation& at) {
+        if (!r || !m) throw_null("rc_reaction, r or m");
+        try {
+            const auto& reaction = at.run->reaction();
+            *r = reaction.data();
+            *m = reaction.size();
+        } catch (const CallbackFailed& failed) {
+            at.failed = failed;
+            throw;
+        }
+    });
+}
+
+rc_status rc_reaction_at(rc_simulation* simulation, size_t index, const double** r, size_t* m)
+{
+    return with(simulation, [&](const rc_simulation& at) {
+        if (!r || !m) throw_null("rc_reaction_at, r or m");
+        require_index("sample", index, at.run->sample_times().size());
+        static const std::vector<double> none;
+        const auto& rows = at.run->reactions();
+        const auto& reaction = rows.empty() ? none : rows[index];
+        *r = reaction.data();
+        *m = reaction.size();
+    });
+}
+
 rc_status rc_solution(rc_simulation* simulation, double t, double* x, size_t n)
 {
     return evaluate(simulation, t, false, x, n);

@@ -50,11 +50,21 @@ struct Record {
     std::string reason;                         ///< text of the `Stop` that ended the run
     std::vector<std::size_t> armed_beyond;      ///< guards that began beyond their surface
     std::vector<Phase> phases;                  ///< of a system with set-valued motion
+    std::vector<double> reaction;
+    std::size_t reaction_width = 0;  ///< number of reactions in the widest row
+    std::vector<double> reactions;   ///< row after row of that width, one for each of `times`
 
     [[nodiscard]] std::size_t event_stride() const noexcept
     {
         return sizeof(EventHead) / sizeof(double) + 2 * width;
     }
+};
+
+/// States at the ends of steps, and their reactions where the system has set-valued motion.
+template <class X>
+struct StepEnds {
+    Trajectory<X> states;
+    std::vector<std::vector<double>> reactions;
 };
 
 /// Writes x to `out`, and NaN up to `width`.
@@ -66,13 +76,24 @@ void put_state(const X& x, std::size_t width, double* out)
     }
 }
 
-/// @param steps  states at the ends of steps, if they are to be kept; null: the samples of the
-/// trajectory are used
+/// Rows one after the other in `out`, narrower ones with NaN behind; returns their width.
+[[nodiscard]] inline std::size_t put_rows(const std::vector<std::vector<double>>& rows,
+                                          std::vector<double>& out)
+{
+    std::size_t width = 0;
+    for (const auto& row : rows) width = std::max(width, row.size());
+    out.resize(rows.size() * width);
+    for (std::size_t i = 0; i < rows.size(); ++i) put_state(rows[i], width, out.data() + i * width);
+    return width;
+}
+
+/// @param steps  ends of steps, if they are to be kept; null: the samples of the trajectory are
+/// used
 template <class X>
-[[nodiscard]] Record record_of(Run<X>&& run, const Trajectory<X>* steps = nullptr)
+[[nodiscard]] Record record_of(Run<X>&& run, const StepEnds<X>* steps = nullptr)
 {
     Record out;
-    const Trajectory<X>& kept = steps ? *steps : run.trajectory;
+    const Trajectory<X>& kept = steps ? steps->states : run.trajectory;
     const auto signed_guard = [](std::size_t guard) { return static_cast<std::int64_t>(guard); };
     out.outcome = run.outcome;
     out.t = run.t;
@@ -89,6 +110,8 @@ template <class X>
     out.reason = run.reason;
     out.armed_beyond = run.armed_beyond;
     out.phases = run.phases;
+    out.reaction = run.reaction;
+    out.reaction_width = put_rows(steps ? steps->reactions : run.reactions, out.reactions);
     out.event_count = run.events.size();
     out.events.resize(out.event_count * out.event_stride());
     double* at = out.events.data();

@@ -157,7 +157,8 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         std::bit_cast<Counts>(r.statistics), r.width, r.event_count, bytes_of(r.events),
         bytes_of(r.times), bytes_of(r.states), r.wrong_bound,
         r.solution ? py::object(pickled(PySolution{r.solution})) : py::object(py::none()),
-        self.modes, self.guard_names, r.reason, r.armed_beyond, pickled(r.phases));
+        self.modes, self.guard_names, r.reason, r.armed_beyond, pickled(r.phases),
+        bytes_of(r.reaction), bytes_of(r.reactions));
 }
 
 [[nodiscard]] PyRun run_from(const py::tuple& state)
@@ -191,6 +192,9 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         r.phases.push_back({py::cast<double>(of[0]), py::cast<bool>(of[1]),
                             static_cast<PhaseCause>(py::cast<int>(of[2]))});
     }
+    r.reaction = numbers_of(state[19]);
+    r.reactions = numbers_of(state[20]);
+    if (!r.times.empty()) r.reaction_width = r.reactions.size() / r.times.size();
     return out;
 }
 
@@ -352,6 +356,25 @@ void bind_results(py::module_& module)
             "phases", [](const PyRun& self) { return listed(self.record.phases); },
             "Of a system with set_valued: tuples of the time from which a phase lasts, whether "
             "something is held or followed by implicit steps in it, and why it began.")
+        .def_property_readonly(
+            "reaction",
+            [self_of](const py::object& self) {
+                const Record& r = self_of(self).record;
+                return view_of(r.reaction.data(), {static_cast<py::ssize_t>(r.reaction.size())},
+                               self);
+            },
+            "Of a system with set_valued: the reactions at the end, after its events; empty where "
+            "the mode has no inclusion, NaN where none follows from the state.")
+        .def_property_readonly(
+            "reactions",
+            [self_of](const py::object& self) {
+                const Record& r = self_of(self).record;
+                return view_of(r.reactions.data(),
+                               {static_cast<py::ssize_t>(r.times.size()),
+                                static_cast<py::ssize_t>(r.reaction_width)},
+                               self);
+            },
+            "The same at `times`, in rows; NaN in modes without an inclusion.")
         .def_property_readonly(
             "success",
             [](const PyRun& self) {

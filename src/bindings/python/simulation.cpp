@@ -23,20 +23,22 @@ namespace {
 
 using Loop = detail::AnyLoop<State>;
 
-/// Runs to the end. If `steps` is not null, appends the state at the end of every step to it, with
+/// Runs to the end. If `kept` is not null, appends the state at the end of every step to it, with
 /// both sides of every reset.
-void drive(Loop& loop, Trajectory<State>* steps)
+void drive(Loop& loop, StepEnds<State>* kept)
 {
-    if (!steps) {
+    if (!kept) {
         loop.run_to_end();
         return;
     }
+    Trajectory<State>& steps = kept->states;
     const auto push = [&](double t, const State& x) {
-        if (x.empty() || (!steps->t.empty() && steps->t.back() == t && steps->x.back() == x)) {
+        if (x.empty() || (!steps.t.empty() && steps.t.back() == t && steps.x.back() == x)) {
             return;
         }
-        steps->t.push_back(t);
-        steps->x.push_back(x);
+        if (!loop.run().phases.empty()) kept->reactions.push_back(loop.reaction());
+        steps.t.push_back(t);
+        steps.x.push_back(x);
     };
     push(loop.t(), loop.x());
     std::size_t seen = loop.run().events.size();
@@ -100,8 +102,8 @@ PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& r
     const std::unique_ptr<RunDoor> door = open_for(request, *source, x0);
     request.options.cancelled = door->watch().cancelled();
     const OwnedSetup owned = setup_for(request, *source, *door);
-    Trajectory<State> steps;
-    Trajectory<State>* const kept = request.record_steps ? &steps : nullptr;
+    StepEnds<State> steps;
+    StepEnds<State>* const kept = request.record_steps ? &steps : nullptr;
     RunLoop loop;
     try {
         loop = RunLoop(request, owned, *door, x0);
@@ -249,6 +251,16 @@ public:
         const Turn turn(in_use_, "Simulation");
         return array_of(loop_->x());
     }
+    [[nodiscard]] py::array reaction()
+    {
+        if (finished_) return array_of(finished_->record.reaction);
+        std::vector<double> r;
+        use([&] {
+            r = loop_->reaction();
+            return true;
+        });
+        return array_of(r);
+    }
     [[nodiscard]] py::object mode()
     {
         const Turn turn(in_use_, "Simulation");
@@ -363,6 +375,9 @@ void bind_runs(py::module_& module)
         .def_property_readonly("t", &PySimulation::t, "The time.")
         .def_property_readonly("x", &PySimulation::x, "The state, which may be kept.")
         .def_property_readonly("mode", &PySimulation::mode, "The mode.")
+        .def_property_readonly("reaction", &PySimulation::reaction,
+                               "The reactions of a system with set_valued there, after the events: "
+                               "empty where the mode has no inclusion, NaN where none follows.")
         .def_property_readonly("ended", &PySimulation::ended, "Whether the run has ended.")
         .def_property_readonly("run", &PySimulation::so_far,
                                "What has been computed so far, as a Run.");
