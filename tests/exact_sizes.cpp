@@ -3,7 +3,7 @@
 
 #include "ricochet/nonsmooth/solvers.hpp"
 
-RICOCHET_SET_VALUED_OF(2, 2)
+RICOCHET_STEPS_OF(2, 2, )
 RICOCHET_HAND_OVER_OF(2, 2)
 
 namespace ricochet {

@@ -227,7 +227,7 @@ def _refuse_near_names(event, who):
 #: Options that SciPy's arguments already give.
 _HERE = ("t_start", "method", "sample_times", "record_steps", "rtol", "atol")
 _ARGUMENTS = ("method", "t_eval", "dense_output", "events", "vectorized", "args", "rtol", "atol",
-              "max_step", "first_step")
+              "max_step", "first_step", "set_valued")
 
 
 def _is_number(given):

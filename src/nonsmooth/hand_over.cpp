@@ -28,6 +28,7 @@ HandOverOptions hand_over_options(const Options& options)
     out.max_steps = std::min(options.max_steps, out.max_steps);
     out.stall_steps = options.stall_steps;
     out.cancelled = options.cancelled;
+    detail::check(out, refuse.who);
     return out;
 }
 
@@ -50,9 +51,9 @@ HandOverOptions inclusion_options(const Options& options)
     return hand_over_options(options);
 }
 
-HandOverOptions completed(HandOverOptions options, bool locate)
+void check(const HandOverOptions& options, std::string_view who)
 {
-    constexpr Require require{"HandOverOptions"};
+    const Require require{who};
     require(std::isfinite(options.t_start), "t_start must be finite", options.t_start);
     require(std::isfinite(options.t_end) && options.t_end >= options.t_start,
             "t_end must be finite and no earlier than t_start", options.t_end);
@@ -64,14 +65,20 @@ HandOverOptions completed(HandOverOptions options, bool locate)
     require(options.h_max > 0, "h_max must be positive", options.h_max);
     require(options.event_tolerance >= 0, "event_tolerance must be zero or positive",
             options.event_tolerance);
-    require(options.set_valued.step >= 0, "set_valued.step must be zero or positive",
-            options.set_valued.step);
+    const double step = options.set_valued.step;
+    require(step >= 0 && std::isfinite(step),
+            "set_valued.step must be zero or positive, and finite", step);
     double last = options.t_start;
     for (const double t : options.sample_times) {
         require(!(t > options.t_end), "sample_times must not lie beyond t_end", t);
         require(t >= last, "sample_times must ascend from t_start to t_end", t);
         last = t;
     }
+}
+
+HandOverOptions completed(HandOverOptions options, bool locate)
+{
+    check(options, "HandOverOptions");
     const double span = options.t_end - options.t_start;
     options.set_valued.t_start = options.t_start;
     options.set_valued.t_end = options.t_end;

@@ -220,7 +220,10 @@ Kind PhaseRules::enter(double t, double* x)
     changes_.clear();
     while (!phases_->empty() && phases_->back().from >= t) phases_->pop_back();
     Kind kind = own;
-    if (has_inclusion()) inclusion().check_bounds(t, x);
+    if (has_inclusion()) {
+        refuse_faulty_set(t, x);
+        inclusion().check_bounds(t, x);
+    }
     if (has_inclusion() && !goes_by_itself(t, x)) {
         const Mode at = inclusion().signs(t, x);
         if (const std::size_t i = unbounded(at, t, x); by_mode_ && i != no_reaction) {
@@ -233,6 +236,22 @@ Kind PhaseRules::enter(double t, double* x)
     note(kind, t, options_.alone && is_implicit(kind) ? cause_ : PhaseCause::start);
     begins_ = true;
     return kind_ = kind;
+}
+
+void PhaseRules::refuse_faulty_set(double t, const double* x)
+{
+    if (options_.alone) return;  // the selection of its first reaction refuses it
+    inclusion().bounds(t, x, lower_.data(), upper_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (lower_[i] <= upper_[i]) continue;
+        throw InclusionRefused(
+            fmt::format("integrate: at the start the bounds of reaction {} are {} and {}; expected "
+                        "numbers, the "
+                        "lower one first",
+                        i, lower_[i], upper_[i]));
+    }
+    const std::string fault = inclusion().fault(t, x);
+    if (!fault.empty()) throw InclusionRefused("integrate: at the start the set " + fault);
 }
 
 Mode PhaseRules::start(double t, double* x)

@@ -270,6 +270,9 @@ private:
         return unbounded(at, t, x) == no_reaction;
     }
 
+    /// @throws InclusionRefused where the set of reactions is empty, or has a bound that is not a
+    /// number.
+    void refuse_faulty_set(double t, const double* x);
     /// The mode of `BranchPhases` in which a run starts.
     [[nodiscard]] Mode start(double t, double* x);
     /// Whether the system's own flow is followed from (t, x).

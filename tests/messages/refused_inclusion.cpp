@@ -19,6 +19,8 @@ using Reaction = Eigen::Matrix<double, 1, 1>;
 // CASE 8: found no `reaction_set` that fits
 // CASE 9: found a system that is no inclusion
 // CASE 11 alone: found a system with set_valued() and a detector whose predictions or bounds are
+// CASE 12 alone: found matrices or steps of an inclusion in its own size, which the library has not
+// compiled
 // CASE 10 alone: found an inclusion of more than 8 components or 4 reactions, which the library has
 // not compiled
 struct Block {
@@ -93,6 +95,13 @@ struct Beside {
     static Block set_valued() { return {}; }
 };
 
+struct Wide {
+    static constexpr int state_size = 2;
+    static constexpr int reaction_size = 2;
+    void smooth(double, const State& w, State& f) const { f = -w; }
+    sets::Ball<2> reaction_set(double, const State&) const { return sets::Ball<2>(1); }
+};
+
 struct Large {
     static constexpr int state_size = 9;
     static constexpr int reaction_size = 1;
@@ -108,6 +117,8 @@ void run()
 #elif CASE == 11
     const Beside::State x0{1, 0};
     Simulation simulation(Beside{}, x0, {.t_end = 1}, ErrorControlled<Dopri5>{}, Planned{});
+#elif CASE == 12
+    CompositeStep<Wide> step(Wide{});
 #else
     (void)hand_over(Block{}, State(0, 0), {.t_end = 1});
 #endif

@@ -4,12 +4,15 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
 #include <numbers>
+#include <string>
 
 #include "piecewise_linear.hpp"
 #include "problems/incline_block.hpp"
 #include "problems/rolling_ball.hpp"
 #include "problems/super_twisting.hpp"
+#include "refusal.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
@@ -613,6 +616,9 @@ TEST(HandOver, RefusesWhatCannotBeRight)
                  std::invalid_argument);
     EXPECT_THROW((void)hand_over(TwinRelays{}, zero, {.t_end = 1, .sample_times = {0.5, 0.2}}),
                  std::invalid_argument);
+    HandOverOptions endless = fine;
+    endless.set_valued.step = std::numeric_limits<double>::infinity();
+    EXPECT_THROW((void)hand_over(TwinRelays{}, zero, endless), std::invalid_argument);
     EXPECT_THROW(RollingBall({.radius = 0}), std::invalid_argument);
     HandOverOptions controlled{.t_end = 1};
     controlled.set_valued.controller = FilteredStep::h211b(4);
@@ -620,6 +626,16 @@ TEST(HandOver, RefusesWhatCannotBeRight)
     HandOverOptions estimated{.t_end = 1};
     estimated.set_valued.estimate = ErrorEstimate::doubling;
     EXPECT_THROW((void)hand_over(TwinRelays{}, zero, estimated), std::invalid_argument);
+}
+
+TEST(HandOver, RefusesOptionsInTheNameOfWhatTookThem)
+{
+    const Eigen::Vector2d zero(0, 0);
+    const std::string sentence = "rtol must lie in [0, 1), got -1";
+    EXPECT_EQ(refusal([&] { (void)integrate(TwinRelays{}, zero, {.t_end = 1, .rtol = -1}); }),
+              "integrate: " + sentence);
+    EXPECT_EQ(refusal([&] { (void)hand_over(TwinRelays{}, zero, {.t_end = 1, .rtol = -1}); }),
+              "HandOverOptions: " + sentence);
 }
 
 /// A half line of reactions: beyond its surface the reaction would be infinite.

@@ -5,9 +5,11 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 
 #include "automata.hpp"
 #include "phased_runs.hpp"
+#include "refusal.hpp"
 
 namespace ricochet::phases_ends_test {
 namespace {
@@ -65,6 +67,84 @@ TEST(PhasesEnds, SeveralMotionsEndARunOfTheInclusionAloneToo)
         hand_over(Repulsive::Motion{3}, Repulsive::Motion::Vector::Zero(), {.t_end = 1});
     EXPECT_EQ(passed.outcome, Outcome::reached_end);
     EXPECT_NEAR(passed.state.w[0], 4, exact_motion);
+}
+
+// --- sets that are faulty at the start, where the system's own flow is followed ---
+
+/// w_i' = -Sgn w_i with given bounds of the last reaction.
+template <int N>
+struct Bounded {
+    using State = std::array<double, N>;
+    double lower, upper;
+
+    struct Motion {
+        static constexpr int state_size = N, reaction_size = N;
+        using Vector = Eigen::Matrix<double, N, 1>;
+        double lower, upper;
+
+        static void smooth(double, const Vector&, Vector& f) { f.setZero(); }
+        [[nodiscard]] sets::Box<N> reaction_set(double, const Vector&) const
+        {
+            std::array<double, N> low, high;
+            low.fill(-1);
+            high.fill(1);
+            low.back() = lower;
+            high.back() = upper;
+            return sets::Box<N>(low, high);
+        }
+    };
+    static void flow(double, const State& x, State& dxdt)
+    {
+        for (std::size_t i = 0; i < N; ++i) dxdt[i] = x[i] >= 0 ? -1 : 1;
+    }
+    [[nodiscard]] Motion set_valued() const { return {lower, upper}; }
+};
+
+TEST(PhasesEnds, ABoundThatIsNoNumberIsRefusedAtTheStart)
+{
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    EXPECT_EQ(refusal([] {
+                  (void)integrate(Bounded<2>{-1, nan}, Two{1, 1}, until(3));
+              }),
+              "integrate: at the start the bounds of reaction 1 are -1 and nan; expected numbers, "
+              "the lower one first");
+}
+
+TEST(PhasesEnds, AnEmptySetIsRefusedAtTheStart)
+{
+    EXPECT_EQ(
+        refusal([] {
+            (void)integrate(Bounded<2>{1, -1}, Two{1, 1}, until(3));
+        }),
+        "integrate: at the start the bounds of reaction 1 are 1 and -1; expected numbers, the "
+        "lower one first");
+}
+
+/// A block, and a contact whose cone of friction is given.
+struct Sliding {
+    using State = std::array<double, 2>;
+    double friction;
+
+    struct Motion {
+        static constexpr int state_size = 2, reaction_size = 2;
+        double friction;
+        static void smooth(double, const Eigen::Vector2d&, Eigen::Vector2d& f) { f << -1, 0; }
+        [[nodiscard]] sets::FrictionCone<2> reaction_set(double, const Eigen::Vector2d&) const
+        {
+            return sets::FrictionCone<2>(friction);
+        }
+    };
+    static void flow(double, const State&, State& dxdt) { dxdt = {-1, 0}; }
+    [[nodiscard]] Motion set_valued() const { return {friction}; }
+};
+
+TEST(PhasesEnds, ASetWithoutBranchesThatIsFaultyIsRefusedAtTheStart)
+{
+    EXPECT_EQ(refusal([] {
+                  (void)integrate(Sliding{-1}, Two{1, 1}, until(0.5));
+              }),
+              "integrate: at the start the set has a negative coefficient of friction");
+    EXPECT_EQ(refusal([] { (void)integrate(Sliding{0.5}, Two{1, 1}, until(0.5)); }), "accepted");
 }
 
 /// A block whose flow knows a part of the friction alone.

@@ -612,6 +612,14 @@ TEST(Phases, AnyMethodOfTheLibraryFollowsThem)
     expect_end(run, Two{-0.5625, 0.876953125});
 }
 
+TEST(Phases, OptionsAreRefusedInTheNameOfIntegrate)
+{
+    const Slider<1> system = loaded([](double) { return 1; });
+    const std::string sentence = "integrate: rtol must lie in [0, 1), got -1";
+    EXPECT_EQ(refusal([&] { (void)integrate(system, {1}, {.t_end = 1, .rtol = -1}); }), sentence);
+    EXPECT_EQ(refusal([&] { Simulation(system, {1}, {.t_end = 1, .rtol = -1}); }), sentence);
+}
+
 TEST(Phases, BackwardRunsAreRefused)
 {
     const Slider<1> system = loaded([](double) { return 1; });

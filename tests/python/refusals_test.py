@@ -856,6 +856,8 @@ def test_options_of_integrate_that_are_none(options, error, words):
 def test_misspelt_options_of_solve_ivp_and_a_monitor_and_members():
     with pytest.raises(TypeError, match="option 'dense_ouput'.*; did you mean 'dense_output'.$"):
         ricochet.solve_ivp(decay, (0, 1), [1.0], dense_ouput=True)
+    with pytest.raises(TypeError, match="option 'set_value'.*; did you mean 'set_valued'.$"):
+        ricochet.solve_ivp(decay, (0, 1), [1.0], set_value=None)
     with pytest.raises(TypeError, match="found an option 'locater'.*; did you mean 'locator'.$"):
         ricochet.Monitor(ricochet.BouncingBall(), [1.0, 0.0], locater="newton")
     with pytest.raises(TypeError, match="found a member 'gaurds'.*; did you mean 'guards'.$"):

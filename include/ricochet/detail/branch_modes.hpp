@@ -673,6 +673,7 @@ public:
     explicit BranchModes(const System& system)
         : BranchModes::AnyModes(detail::exact_inclusion(system))
     {
+        static_assert(detail::check_own_size<state_size<System>, reaction_size<System>>());
     }
 };
 

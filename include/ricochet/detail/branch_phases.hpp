@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "ricochet/detail/composite_step.hpp"
@@ -93,6 +94,8 @@ public:
     virtual void shift(std::size_t i, double amount, double* x) const = 0;
     /// The bounds; false where they form no interval.
     virtual bool bounds(double t, const double* x, double* lower, double* upper) const = 0;
+    /// What is wrong with the set at (t, x); empty if nothing is.
+    [[nodiscard]] virtual std::string fault(double t, const double* x) const = 0;
     /// Whether a load, a bound or an offset jumps between the double before t and t.
     [[nodiscard]] virtual bool jumps(double t, const double* x) = 0;
 

@@ -245,6 +245,7 @@ public:
     explicit CompositeStep(const System& system, const SchemeOptions& options = {})
         : CompositeStep::AnyStep(detail::exact_inclusion(system), options)
     {
+        static_assert(detail::check_own_size<state_size<System>, reaction_size<System>>());
     }
 };
 

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "ricochet/hybrid/guard.hpp"
@@ -72,8 +73,8 @@ struct RICOCHET_ALIGNED HandOverRun {
 };
 
 /// Converts the options of `integrate`.
-/// @throws std::invalid_argument for options that a hand-over does not support: `stop_at_event`,
-/// `record_steps`, a run backward.
+/// @throws std::invalid_argument for invalid options, and for those that a hand-over does not
+/// support: `stop_at_event`, `record_steps`, a run backward.
 [[nodiscard]] HandOverOptions hand_over_options(const Options& options);
 
 namespace detail {
@@ -82,6 +83,8 @@ namespace detail {
 /// of components.
 [[nodiscard]] HandOverOptions options_of_phases(const Options& options);
 
+/// @throws std::invalid_argument that begins with `who` and names the option.
+void check(const HandOverOptions& options, std::string_view who);
 /// The options with defaults filled in.
 /// @throws std::invalid_argument naming the option.
 [[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);

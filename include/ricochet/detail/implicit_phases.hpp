@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "ricochet/detail/branch_phases.hpp"
@@ -111,6 +112,10 @@ public:
         write(least, lower, reactions());
         write(most, upper, reactions());
         return fine;
+    }
+    [[nodiscard]] std::string fault(double t, const double* x) const override
+    {
+        return matrices().inclusion().fault(t, vector(x));
     }
     [[nodiscard]] bool jumps(double t, const double* x) override
     {

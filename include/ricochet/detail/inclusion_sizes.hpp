@@ -36,6 +36,14 @@
     ricochet::detail::make_branch_phases<N, M>(const ricochet::detail::AnyInclusion<N, M>&,    \
                                                const ricochet::detail::BranchPhasesOptions&);
 
+/// Compiles matrices and steps of exactly this size alone, for `InclusionMatrices`, `CompositeStep`
+/// and `BranchModes`, which look into a system in its own size. `how` as below.
+#define RICOCHET_STEPS_OF(N, M, how) RICOCHET_STEPS_OF_##how(N, M)
+#define RICOCHET_STEPS_OF_extern(N, M) \
+    template <>                        \
+    struct ricochet::detail::CompiledSteps<N, M>;
+#define RICOCHET_STEPS_OF_(N, M) RICOCHET_STEPS_OF_extern(N, M) RICOCHET_SET_VALUED_OF(N, M)
+
 /// Runs systems of N components and M reactions in solvers of exactly this size. With `extern` as
 /// its third argument it says that they are compiled elsewhere; with nothing it compiles them, and
 /// needs nonsmooth/solvers.hpp. More than four reactions have no modes.
@@ -60,6 +68,11 @@ namespace ricochet::detail {
 /// Incomplete for the sizes that RICOCHET_INCLUSIONS_OF has declared.
 template <int N, int M>
 struct CompiledExactly {
+};
+
+/// Incomplete for the sizes that RICOCHET_STEPS_OF has declared.
+template <int N, int M>
+struct CompiledSteps {
 };
 
 struct InclusionSize {
@@ -99,6 +112,27 @@ template <int n, int m>
     }
 #endif
     return {n, m};
+}
+
+/// Refuses a size in which no matrices and steps are compiled.
+template <int n, int m>
+consteval bool check_own_size()
+{
+    constexpr bool steps = !requires
+    {
+        sizeof(CompiledSteps<n, m>);
+    };
+    if constexpr (!steps) {
+        constexpr InclusionSize size = size_for<n, m>();
+        static_assert(
+            size.components == n && size.reactions == m,
+            "ricochet: found matrices or steps of an inclusion in its own size, which the library "
+            "has not compiled; expected RICOCHET_STEPS_OF(state_size, reaction_size, extern) "
+            "before "
+            "their first use and, in one source with nonsmooth/solvers.hpp, the same without "
+            "`extern`; or a SetValuedMotion, which needs neither");
+    }
+    return true;
 }
 
 template <int n, int m>

@@ -525,6 +525,7 @@ public:
     explicit InclusionMatrices(const System& system)
         : InclusionMatrices::AnyMatrices(detail::exact_inclusion(system))
     {
+        static_assert(detail::check_own_size<N, M>());
     }
 
     [[nodiscard]] const System& system() const noexcept
