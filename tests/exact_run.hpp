@@ -20,6 +20,10 @@
 
 namespace ricochet::test {
 
+using detail::counts;
+using detail::opposite;
+using detail::side_of;
+
 using Real = long double;
 
 /// A polynomial of degree three.

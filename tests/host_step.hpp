@@ -11,6 +11,9 @@
 
 namespace ricochet::test {
 
+using detail::Finding;
+using detail::Watch;
+
 using HostState = std::array<double, 2>;
 
 /// The guard is the second component of the state.

@@ -11,6 +11,8 @@
 
 namespace ricochet::test {
 
+using detail::Location;
+
 /// Locates the first crossing of a step whose guard is armed on `side` and has left
 /// it at the end.
 template <class Locator>

@@ -332,7 +332,8 @@ typedef struct rc_options {
     const double* component_atol; /**< one for each component in place of atol, copied; null */
     size_t component_count;       /**< number of them, 0 */
     int32_t continues; /**< 0; 1: t_start belongs to the run before: nothing happens there by the
-                          list or the clock of the system, nor by at_start of its guards */
+                          list or the clock of the system, nor by at_start of its guards. A timer
+                          of next_time_event_at that is due there has its event */
     int32_t reserved;  /**< 0 */
 } rc_options;
 
@@ -581,10 +582,11 @@ RC_API rc_status rc_save(rc_simulation* simulation, void* bytes, size_t* size);
 RC_API rc_status rc_restore(rc_simulation* simulation, const void* bytes, size_t size);
 
 /** Goes on from the `n` doubles `x` at time t in a mode, as from a start: guards are armed again,
- * and a time event at t belongs to the past. t may be any time from t_start to before t_end, also
- * one at which rc_advance has stopped inside a step; what was recorded after it is dropped. A run
- * that has ended goes on. RC_INVALID if t lies outside of the run, or rc_simulation_new would
- * refuse such a start; then, and after RC_CALLBACK, nothing has changed. */
+ * an event of the list, the clock or next_time_event at t belongs to the past, and a timer of
+ * next_time_event_at that is due there has its event. t may be any time from t_start to before
+ * t_end, also one at which rc_advance has stopped inside a step; what was recorded after it is
+ * dropped. A run that has ended goes on. RC_INVALID if t lies outside of the run, or
+ * rc_simulation_new would refuse such a start; then, and after RC_CALLBACK, nothing has changed. */
 RC_API rc_status rc_restart(rc_simulation* simulation, double t, const double* x, size_t n,
                             rc_mode mode);
 /** Moves the end of the run to `t_end`. A run that has reached its end goes on. RC_INVALID if it

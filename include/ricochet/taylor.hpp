@@ -104,8 +104,8 @@ void step_by_series(RunSetup<CoreState<X>>& setup)
     setup.quiet_on_series = true;
     setup.quiet = nullptr;
     const auto& detector = setup.detector;
-    const bool proves =
-        detector.screening == Screening::extremum || detector.screening == Screening::every;
+    const bool proves = detector.screening == detail::Screening::extremum ||
+                        detector.screening == detail::Screening::every;
     const bool alone = Kernel::on_series && proves && !detector.clears && !detector.defers &&
                        setup.system->guard_count(setup.door) == 1;
     if (!setup.system->guarded || alone) {

@@ -111,7 +111,8 @@ def integrate(system, x0, t_end, **options):
         Default 0.
     continues : bool
         The run goes on where another has ended: nothing happens at ``t_start`` by ``time_events``
-        or by ``at_start`` of guards.
+        or by ``at_start`` of guards. A timer of ``next_time_event(t, x)`` that is due there has its
+        event.
     mode
         The mode at the start; by default the first, or that of the ready system.
     method : str
@@ -172,11 +173,13 @@ class Simulation(_ricochet.Simulation):
     def restart(self, t, x, mode=None):
         """Goes on from state ``x`` at time ``t`` in a mode (default: the present one), as from a start.
 
-        Guards are armed and the first step is estimated again, and a time event at ``t`` belongs to the
-        past. ``t`` may be any time from ``t_start`` to before ``t_end``, also one that `advance` has
-        stopped at inside a step; what was recorded after it is dropped. A run that has ended goes on,
-        unless `finish` was called or a function of the system has raised. Raises ValueError if ``t``
-        lies outside of the run, or `integrate` would refuse such a start; then nothing has changed.
+        Guards are armed and the first step is estimated again. An event of ``time_events`` or
+        ``next_time_event(t)`` at ``t`` belongs to the past; a timer of ``next_time_event(t, x)`` that
+        is due there has its event. ``t`` may be any time from ``t_start`` to before ``t_end``, also one
+        that `advance` has stopped at inside a step; what was recorded after it is dropped. A run that
+        has ended goes on, unless `finish` was called or a function of the system has raised. Raises
+        ValueError if ``t`` lies outside of the run, or `integrate` would refuse such a start; then
+        nothing has changed.
         """
         options = {} if mode is None else {"mode": mode}
         set_mode(options, *self._of)

@@ -67,10 +67,10 @@ bool is_actor(const Model& model)
 std::vector<std::string> feature_names(const Model& model)
 {
     std::vector<std::string> names;
-    if (model.recipe == name(Recipe::ballistic)) {
+    if (model.recipe == name(detail::Recipe::ballistic)) {
         names = {"slog(g / (|g''| h²))", "slog(g' / (|g''| h))"};
     } else if (const SystemEntry* system = system_of(model);
-               system != nullptr && model.recipe == name(Recipe::state)) {
+               system != nullptr && model.recipe == name(detail::Recipe::state)) {
         for (const Component& x : system->state) {
             names.push_back(fmt::format("{} [{}]", x.name, x.unit));
         }
@@ -100,7 +100,8 @@ bool recipe_known(const Model& model)
             return false;
         }
     }
-    return model.recipe == name(Recipe::state) || model.recipe == name(Recipe::ballistic);
+    return model.recipe == name(detail::Recipe::state) ||
+           model.recipe == name(detail::Recipe::ballistic);
 }
 
 /// Weights and biases.

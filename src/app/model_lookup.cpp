@@ -40,13 +40,13 @@ std::string objection_to_shape(const SystemEntry& system, const Model& model)
     if (model.kind != "event-classifier") {
         return fmt::format("is a {}, expected an event-classifier", model.kind);
     }
-    Recipe recipe{};
+    detail::Recipe recipe{};
     try {
-        recipe = recipe_named(model.recipe);
+        recipe = detail::recipe_named(model.recipe);
     } catch (const std::invalid_argument& error) {
         return fmt::format("has an {}", error.what());
     }
-    const std::size_t expected = dimension(recipe, system.state.size());
+    const std::size_t expected = detail::dimension(recipe, system.state.size());
     const std::size_t features = model.layers.front().inputs;
     if (features != expected) {
         return fmt::format("takes {} features, but the recipe '{}' makes {} of a state of {}",

@@ -229,7 +229,13 @@ protected:
     /// Applies a set without guards at the start of the step: a time event, or a change that the
     /// stepper has located. `settle` deals with its consequences.
     /// @param taken  as in `leave_from_start`
-    void apply_without_guards(bool on_time, double taken = 0);
+    void apply_without_guards(bool on_time, double taken = 0)
+    {
+        bank_.take_bands();
+        apply_at_start(on_time, taken);
+    }
+    /// The same for a further level of an instant, at which guards have the tolerances of its set.
+    void apply_at_start(bool on_time, double taken = 0);
     void apply_time_event(double taken = 0) { apply_without_guards(true, taken); }
 
     /// After a time event the flow is that of the double after it, where it jumps there.
@@ -798,19 +804,24 @@ protected:
     /// Whether guard i, just armed in a mode that has been entered, asks to fire there.
     [[nodiscard]] bool fires_at_entry(std::size_t i) noexcept;
 
-    void count_armed_beyond(std::size_t i) noexcept
+    void count_armed_beyond(std::size_t i, bool on_surface) noexcept
     {
         ++run_.statistics.armed_beyond;
         bank_[i].armed_beyond = true;
+        bank_[i].armed_on = on_surface;
     }
 
     /// Lists the guards that were armed beyond their surfaces.
     void list_armed_beyond()
     {
         run_.armed_beyond.clear();
+        run_.armed_on_surface.clear();
         if (run_.statistics.armed_beyond == 0) return;
         for (std::size_t i = 0; i < std::min(bank_.size(), own_guards_); ++i) {
-            if (std::as_const(bank_)[i].armed_beyond) run_.armed_beyond.push_back(i);
+            const GuardRecord& record = std::as_const(bank_)[i];
+            if (!record.armed_beyond) continue;
+            run_.armed_beyond.push_back(i);
+            if (record.armed_on) run_.armed_on_surface.push_back(i);
         }
     }
 
@@ -839,7 +850,7 @@ protected:
     [[nodiscard]] unsigned facts_of(const GuardRecord& record, Side from,
                                     const Seen& seen) const noexcept
     {
-        return life::declared_of(record.info, resets_any_ && record.info.resets, record.acting) |
+        return life::declared_of(record.info, resets_any_ && record.info.resets) |
                life::seen_of(from, seen.side, seen.on, record.info.crossing) |
                (seen.set_off ? life::is_set_off : 0u);
     }
@@ -856,12 +867,19 @@ protected:
     /// changed the state or the flow, or the resets of other guards have, and guard i stood on its
     /// surface since the start or its last event.
     [[nodiscard]] bool is_set_in_motion(std::size_t i);
+    /// Whether guard i, which is only recorded, has had an event with the set that has been
+    /// located.
+    [[nodiscard]] bool is_recorded_with_set(std::size_t i) const noexcept
+    {
+        const GuardRecord& record = std::as_const(bank_)[i];
+        const double t = step_.time(0);
+        return located_ && !record.acting && std::fabs(t - record.last) <= resolution_.blur(t);
+    }
     /// Whether guard i stands on its surface, and no side is known from which it came.
     [[nodiscard]] bool stands(std::size_t i) const noexcept
     {
         const GuardRecord& record = std::as_const(bank_)[i];
-        return record.enabled && record.acting && record.side == Side::plateau &&
-               record.awaited == Side::plateau;
+        return record.enabled && record.side == Side::plateau && record.awaited == Side::plateau;
     }
     /// Whether there is such a guard, which the reset of another one may set in motion.
     [[nodiscard]] bool any_stands() const noexcept

@@ -153,17 +153,18 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::is_due_here(After what)
 {
     const double t = step_.start().value;
-    const bool is_past = what == After::start && options_.continues;
     if (system_->time_event_count) {
         if (listed_at_ != t) {
             listed_at_ = t;
-            const bool none = is_past || what == After::restart;
-            listed_left_ = none ? 0 : system_->time_event_count(system_.door(), t);
+            const bool is_past =
+                what == After::restart || (what == After::start && options_.continues);
+            listed_left_ = is_past ? 0 : system_->time_event_count(system_.door(), t);
         }
         if (what == After::time_event && listed_left_ > 0) --listed_left_;
         return listed_left_ > 0;
     }
-    if (backward_ || !system_->next_time_event_at || is_past || timer_idles_) return false;
+    // A timer in the state has been moved on by an event that has happened, also in another run.
+    if (backward_ || !system_->next_time_event_at || timer_idles_) return false;
     const double ahead = step_.until(time_event_);
     return time_event_ == t || (ahead <= 0 && -ahead <= resolution_.window(t));
 }
@@ -180,7 +181,7 @@ inline bool EventEngine<X, single>::apply_due_time_event()
     search_.begin(step_.x0());
     search_.stay_at_start();
     place_set(step_.instant(0, 0));
-    apply_time_event();
+    apply_at_start(true);
     return !ended_;
 }
 
@@ -192,9 +193,8 @@ inline bool EventEngine<X, single>::timer_is_endless()
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::apply_without_guards(bool on_time, double taken)
+inline void EventEngine<X, single>::apply_at_start(bool on_time, double taken)
 {
-    bank_.take_bands();
     search_.fired().clear();
     assign(search_.before(), step_.x0());
     leave_from_start(taken);

@@ -157,12 +157,11 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
         throw_start_outside_mode(who_, i, info.name, options_.t_start, g);
     }
     bank_.arm(i, side);
-    if (side == Side::plateau)
-        bank_.await(i, life::awaited_side(life::Cause::start, info, record.acting, side));
+    if (side == Side::plateau) bank_.await(i, life::awaited_side(life::Cause::start, info, side));
     if (arming == life::Arming::waits) {
         // One that fires at the start has done so in the run before.
         const bool is_known = !begins && info.at_start && options_.continues;
-        if (record.acting && is_beyond(side, info.crossing) && !is_known) count_armed_beyond(i);
+        if (record.acting && is_beyond(side, info.crossing) && !is_known) count_armed_beyond(i, on);
     } else if (arming != life::Arming::outside && counts_here(i)) {
         have_event(i, arming, side);
     }
@@ -258,15 +257,15 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
     const Side before = record.side != Side::plateau ? record.side : record.awaited;
     const Seen seen = see(i, before, widest, opens);
     const Side side = seen.side;
-    const life::Cause cause = record.fired           ? life::Cause::fired
-                              : record.newly_enabled ? life::Cause::enabled
-                              : opens                ? life::Cause::opened
-                                                     : life::Cause::stood;
+    const life::Cause cause = record.fired || is_recorded_with_set(i) ? life::Cause::fired
+                              : record.newly_enabled                  ? life::Cause::enabled
+                              : opens                                 ? life::Cause::opened
+                                                                      : life::Cause::stood;
     record.departs = seen.on || record.fired || record.newly_enabled;
     bank_.arm(i, side);
     record.from = 0;
     if (side == Side::plateau) {
-        bank_.await(i, life::awaited_side(cause, record.info, record.acting, before));
+        bank_.await(i, life::awaited_side(cause, record.info, before));
     }
     if (changed_mode_ && located_ && crossing == Crossing::either && record.fired &&
         record.acting && side == before && side != Side::plateau) {
@@ -282,7 +281,7 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
     if (has_event && counts_here(i)) {
         have_event(i, arming, before);
     } else if (record.newly_enabled && record.acting && is_beyond(side, crossing)) {
-        count_armed_beyond(i);
+        count_armed_beyond(i, seen.on);
     }
     const bool outside = arming == life::Arming::outside && is_enabled_here(i);
     if (outside) end(Outcome::outside_mode, i);
@@ -329,10 +328,9 @@ template <class X, bool single>
 bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
 {
     const GuardRecord& record = bank_[i];
-    if (!leaves_phase_ || !record.acting || record.newly_enabled || side == Side::plateau) {
-        return false;
-    }
-    if (record.info.boolean || record.info.crossing == Crossing::either) return false;
+    if (!leaves_phase_ || record.newly_enabled || side == Side::plateau) return false;
+    const bool either = record.info.crossing == Crossing::either;
+    if (record.info.boolean || (either && record.fired)) return false;
     const bool is_member = record.fired && resets_any_ && record.info.resets;
     if (!changed_mode_ && !is_member && !is_set_in_motion(i)) return false;
     const X& left = search_.before();
@@ -349,6 +347,7 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
     const double noise =
         tolerances::of_location * std::fabs(bank_.complete_rate0(i, step_, h_next_, calls()));
     if (sign_of(side) * moved > noise) return false;
+    if (either && sign_of(side) * moved < -noise) return false;  // a motion that turns back
     if (sign_of(side) * moved >= -noise) {  // a vanishing rate has the sign that it has later
         const double ahead = tolerances::of_heading * h_next_;
         const double then = step_.inside(step_.time(ahead));
@@ -365,7 +364,8 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
             step_.flow_in(mode_before_, then, later, rate);
         }
         move(later, step_.x0(), ahead, left_rate_);
-        if (sign_of(side) * guard.rate(then, later, rate, h_next_) > noise) return false;
+        const double moves = sign_of(side) * guard.rate(then, later, rate, h_next_);
+        if (moves > noise || (either && moves < -noise)) return false;
     }
     return record.fired || std::fabs(guard.value(t, left)) <= rounding_of(i, step_.mode(), t, left);
 }
@@ -387,7 +387,7 @@ template <class X, bool single>
 bool EventEngine<X, single>::stays_within_rounding(std::size_t i)
 {
     const GuardRecord& record = bank_[i];
-    if (!record.acting || record.fired || record.newly_enabled || record.info.boolean) return false;
+    if (record.fired || record.newly_enabled || record.info.boolean) return false;
     return lies_within_rounding(i);
 }
 

@@ -29,15 +29,14 @@ inline constexpr std::size_t causes = 5;
 enum Fact : unsigned {
     is_unilateral = 1,  ///< it bounds the motion
     has_reset = 2,
-    acts = 4,          ///< it has a reset or may end the run
-    on_surface = 8,    ///< within its error
-    is_below = 16,     ///< it lies below, or heads there
-    crosses = 32,      ///< it is now on the other side, and to leave the side where it was counts
-    arrives = 64,      ///< it heads away from a side that it leaves by an event
-    is_set_off = 128,  ///< the set has changed the flow, which did not carry it across before
-    asks = 256,        ///< it is beyond its surface, and is asked to fire by that condition here
+    on_surface = 4,   ///< within its error
+    is_below = 8,     ///< it lies below, or heads there
+    crosses = 16,     ///< it is now on the other side, and to leave the side where it was counts
+    arrives = 32,     ///< it heads away from a side that it leaves by an event
+    is_set_off = 64,  ///< the set has changed the flow, which did not carry it across before
+    asks = 128,       ///< it is beyond its surface, and is asked to fire by that condition here
 };
-inline constexpr unsigned facts = 512;
+inline constexpr unsigned facts = 256;
 
 /// What follows.
 enum class Arming : std::uint8_t {
@@ -78,7 +77,7 @@ inline constexpr std::array rows{
         "a reset that carries it across in its direction fires it at the same instant"},
     Row{by(Cause::fired), crosses, has_reset | on_surface, Arming::fires,
         "carried back across by the reset of another, it fires again"},
-    Row{by(Cause::enabled) | by(Cause::opened), arrives | acts | on_surface, 0, Arming::fires,
+    Row{by(Cause::enabled) | by(Cause::opened), arrives | on_surface, 0, Arming::fires,
         "where its mode begins, or a veto ends, on its surface while it crosses, it fires"},
     Row{whenever, 0, 0, Arming::waits,
         "else it waits for its next crossing, beyond its surface for its return"},
@@ -113,10 +112,9 @@ inline constexpr auto armings = [] {
 }
 
 /// What a guard declares.
-[[nodiscard]] constexpr unsigned declared_of(const GuardInfo& info, bool resets, bool acting)
+[[nodiscard]] constexpr unsigned declared_of(const GuardInfo& info, bool resets)
 {
-    return (info.unilateral ? is_unilateral : 0u) | (resets ? has_reset : 0u) |
-           (acting ? acts : 0u);
+    return (info.unilateral ? is_unilateral : 0u) | (resets ? has_reset : 0u);
 }
 
 /// What is seen of a guard that was `from` on one side, or came from there to its plateau, and now
@@ -129,12 +127,11 @@ inline constexpr auto armings = [] {
 }
 
 /// The side whose departure is the event of a guard that stands on its surface.
-[[nodiscard]] constexpr Side awaited_side(Cause cause, const GuardInfo& info, bool acting,
-                                          Side from) noexcept
+[[nodiscard]] constexpr Side awaited_side(Cause cause, const GuardInfo& info, Side from) noexcept
 {
     if (info.unilateral) return Side::above;
     if (cause == Cause::start || cause == Cause::fired) return Side::plateau;
-    if (cause != Cause::enabled || !acting || info.crossing == Crossing::either) return from;
+    if (cause != Cause::enabled || info.crossing == Crossing::either) return from;
     return info.crossing == Crossing::falling ? Side::above : Side::below;
 }
 

@@ -107,6 +107,7 @@ struct GuardRecord {
     std::uint64_t instant = 0;  ///< the last at which it fired at the start of a step
     std::uint32_t at_once = 0;  ///< how often it did so then
     bool armed_beyond = false;  ///< where it was armed at the start, or by a mode
+    bool armed_on = false;      ///< the last time on its surface, moving beyond
 };
 
 [[nodiscard]] constexpr double sign_of(Side side) noexcept

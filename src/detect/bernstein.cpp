@@ -462,12 +462,12 @@ Finding first_event(const BernsteinTask& task, Watch& watch, const double* value
 
 namespace ricochet {
 
-Finding Bernstein::examine(GuardPath& path, Watch& watch) const
+detail::Finding Bernstein::examine(GuardPath& path, detail::Watch& watch) const
 {
     watch.side_after = watch.side;
     const double width = watch.end.s - watch.start.s;
     if (watch.side == Side::plateau || !(width > 0)) {
-        return Finding::clear(Evidence::checked);
+        return detail::Finding::clear(Evidence::checked);
     }
     const int degree = path.degree();
     // Rounding [s] of a time in the step.
@@ -490,7 +490,7 @@ Finding Bernstein::examine(GuardPath& path, Watch& watch) const
     at(n) = watch.end.s == path.h() ? watch.end.value : sample(n);
 
     if (detail::stays_on_side(task, watch, values.data())) {
-        return Finding::clear(task.degree > 0 ? Evidence::proved : Evidence::checked);
+        return detail::Finding::clear(task.degree > 0 ? Evidence::proved : Evidence::checked);
     }
     return detail::first_event(task, watch, values.data(), detail::GuardCurve(path));
 }

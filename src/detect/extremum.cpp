@@ -7,6 +7,12 @@ namespace ricochet {
 
 namespace {
 
+using detail::counts;
+using detail::Finding;
+using detail::has_left;
+using detail::opposite;
+using detail::Watch;
+
 /// The guard times the sign of its armed side on an interval, as a cubic over u in
 /// [0, 1] through the values and rates at both ends.
 struct GuardCubic {

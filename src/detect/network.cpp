@@ -65,7 +65,7 @@ void check_model_step(const Model& model, double smallest, double largest)
 
 BareNetwork::BareNetwork(Model model)
     : classifier_(detail::Shared<Classifier>::make(std::move(model))),
-      recipe_(recipe_named(classifier_->model().recipe))
+      recipe_(detail::recipe_named(classifier_->model().recipe))
 {
     if (this->model().kind != "event-classifier") {
         throw std::invalid_argument(

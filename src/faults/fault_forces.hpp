@@ -51,7 +51,7 @@ public:
     }
 
     [[nodiscard]] StiffnessProduct& product() noexcept { return product_; }
-    [[nodiscard]] const Spectrum& spectrum() const noexcept { return spectrum_; }
+    [[nodiscard]] const detail::Spectrum& spectrum() const noexcept { return spectrum_; }
     [[nodiscard]] const StiffnessSeries& root_of_stiffness() const noexcept { return root_; }
     [[nodiscard]] double bound() const noexcept { return bound_; }
     [[nodiscard]] std::uint64_t evaluations() const noexcept { return evaluations_; }
@@ -61,7 +61,7 @@ public:
 private:
     const StrikeSlipFault& fault_;
     StiffnessProduct product_;
-    Spectrum spectrum_;
+    detail::Spectrum spectrum_;
     StiffnessSeries root_;
     double bound_;
     Eigen::VectorXd kd_, hv_;

@@ -16,7 +16,7 @@ double root(double eigenvalue)
 StageStiffness::StageStiffness(const StrikeSlipFault& fault, double bound)
     : damping_(2 * fault.parameters().damping), product_(fault.stiffness())
 {
-    const Spectrum spectrum = fault.stiffness().spectrum();
+    const detail::Spectrum spectrum = fault.stiffness().spectrum();
     root_ = StiffnessSeries::within(root, spectrum, bound);
     rough_root_ = StiffnessSeries::within(root, spectrum, rough);
     bound_ = root_.relative_error(root);

@@ -429,7 +429,7 @@ double least_ritz_value(StiffnessProduct& product)
 
 }  // namespace
 
-Spectrum FaultStiffness::spectrum() const
+detail::Spectrum FaultStiffness::spectrum() const
 {
     const double allowance = size() == 1 ? 1 : 0.97;
     StiffnessProduct product(*this);

@@ -12,21 +12,21 @@ namespace ricochet {
 
 namespace {
 
-double at(const Spectrum& interval, double x)
+double at(const detail::Spectrum& interval, double x)
 {
     return 0.5 * (interval.upper + interval.lower) + 0.5 * (interval.upper - interval.lower) * x;
 }
 
 /// An interval that has a width.
-Spectrum widened(Spectrum interval)
+detail::Spectrum widened(detail::Spectrum interval)
 {
     interval.upper = std::max(interval.upper, interval.lower * (1 + 1e-12));
     return interval;
 }
 
 /// Coefficients of the series of f, from its values at the zeros of a far higher polynomial.
-std::vector<double> coefficients(const StiffnessSeries::Function& f, const Spectrum& interval,
-                                 int count)
+std::vector<double> coefficients(const StiffnessSeries::Function& f,
+                                 const detail::Spectrum& interval, int count)
 {
     constexpr int samples = 1024;
     std::vector<double> cosine(4 * samples);
@@ -48,7 +48,7 @@ std::vector<double> coefficients(const StiffnessSeries::Function& f, const Spect
 
 }  // namespace
 
-StiffnessSeries::StiffnessSeries(const Function& f, Spectrum interval, int degree)
+StiffnessSeries::StiffnessSeries(const Function& f, detail::Spectrum interval, int degree)
     : interval_(widened(interval)), c_(coefficients(f, interval_, degree + 1))
 {
 }
@@ -67,8 +67,8 @@ Eigen::VectorXd chebyshev_values(double x, int degree)
 
 /// Remez's exchange: the coefficients whose largest relative error is least, from a few rounds.
 /// Empty where the points no longer alternate, as happens near rounding.
-std::vector<double> of_least_error(const StiffnessSeries::Function& f, const Spectrum& interval,
-                                   int degree)
+std::vector<double> of_least_error(const StiffnessSeries::Function& f,
+                                   const detail::Spectrum& interval, int degree)
 {
     constexpr int rounds = 6;
     const int unknowns = degree + 2;
@@ -113,7 +113,7 @@ std::vector<double> of_least_error(const StiffnessSeries::Function& f, const Spe
 
 }  // namespace
 
-StiffnessSeries StiffnessSeries::within(const Function& f, Spectrum interval, double bound)
+StiffnessSeries StiffnessSeries::within(const Function& f, detail::Spectrum interval, double bound)
 {
     const StiffnessSeries all(f, interval, most_terms);
     StiffnessSeries some;

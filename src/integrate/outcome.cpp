@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <iterator>
 #include <stdexcept>
 
 #include "ricochet/integrate/run.hpp"
@@ -147,19 +149,26 @@ std::string detail::describe_reason(Outcome outcome, const std::string& reason)
 }
 
 std::string detail::describe_run(Outcome outcome, const std::string& reason,
-                                 const std::vector<std::size_t>& armed_beyond)
+                                 const std::vector<std::size_t>& armed_beyond,
+                                 const std::vector<std::size_t>& armed_on_surface)
 {
     std::string out(describe(outcome));
     if (!reason.empty()) out = describe_reason(outcome, reason);
-    if (armed_beyond.empty()) return out;
-    out += armed_beyond.size() == 1 ? "; guard " : "; guards ";
-    for (std::size_t i = 0; i < armed_beyond.size(); ++i) {
-        if (i > 0) out += ", ";
-        out += std::to_string(armed_beyond[i]);
-    }
-    return out +
-           " began beyond its surface, and waited until it had returned (at_start and "
-           "at_entry let it fire there)";
+    std::vector<std::size_t> beyond;
+    std::set_difference(armed_beyond.begin(), armed_beyond.end(), armed_on_surface.begin(),
+                        armed_on_surface.end(), std::back_inserter(beyond));
+    const auto say = [&](const std::vector<std::size_t>& guards, std::string_view what) {
+        if (guards.empty()) return;
+        out += fmt::format("; guard{} {} {}", guards.size() == 1 ? "" : "s",
+                           fmt::join(guards, ", "), what);
+    };
+    say(beyond,
+        "began beyond its surface, and waited until it had returned (at_start and at_entry let it "
+        "fire there)");
+    say(armed_on_surface,
+        "began on its surface and moved on beyond it, which is no event (`continues` holds again "
+        "what was at rest, unilateral and at_start give it one)");
+    return out;
 }
 
 }  // namespace ricochet

@@ -82,8 +82,9 @@ struct FixedStepFloor : Floor {
 
     void features(const Ball& ball, double* out) const
     {
-        ricochet::features(Recipe::state, BouncingBall({.gravity = gravity}),
-                           BouncingBall::State{ball.u, ball.v}, step, out);
+        ricochet::detail::features(ricochet::detail::Recipe::state,
+                                   BouncingBall({.gravity = gravity}),
+                                   BouncingBall::State{ball.u, ball.v}, step, out);
     }
 
     [[nodiscard]] std::vector<Interval> domain() const
@@ -118,13 +119,14 @@ struct AnyStepFloor : Floor {
 
     void features(const Ball& ball, double* out) const
     {
-        ricochet::features(Recipe::ballistic, BouncingBall({.gravity = ball.gravity}),
-                           BouncingBall::State{ball.u, ball.v}, ball.step, out);
+        ricochet::detail::features(ricochet::detail::Recipe::ballistic,
+                                   BouncingBall({.gravity = ball.gravity}),
+                                   BouncingBall::State{ball.u, ball.v}, ball.step, out);
     }
 
     [[nodiscard]] std::vector<Interval> domain() const
     {
-        const double end = slog(largest);
+        const double end = ricochet::detail::slog(largest);
         return {{.lower = -end, .upper = end}, {.lower = -end, .upper = end}};
     }
 };
@@ -214,12 +216,12 @@ Trained train_bouncing_ball(BallModel kind, const BallTraining& training,
     Model& model = trained.model;
     model.system = "bouncing-ball";
     if (kind == BallModel::fixed_step) {
-        model.recipe = name(Recipe::state);
+        model.recipe = name(ricochet::detail::Recipe::state);
         model.parameters = {{"gravity", training.gravity}};
         model.domain = FixedStepFloor(training).domain();
         model.step_min = model.step_max = training.step;
     } else {
-        model.recipe = name(Recipe::ballistic);
+        model.recipe = name(ricochet::detail::Recipe::ballistic);
         model.domain = AnyStepFloor{}.domain();
         model.step_min = 1e-6;
         model.step_max = 1e2;

@@ -68,7 +68,7 @@ void check_recipe(const Model& model)
             "says "
             "nothing of the guard's value");
     }
-    if (model.recipe == name(Recipe::state)) return;
+    if (model.recipe == name(ricochet::detail::Recipe::state)) return;
     throw std::invalid_argument(
         fmt::format("certify: expected a model with the recipe 'state', whose features are the "
                     "components of the state, got the recipe '{}'",

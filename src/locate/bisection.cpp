@@ -6,7 +6,8 @@
 
 namespace ricochet {
 
-Location Bisection::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
+detail::Location Bisection::locate(GuardPath& path, GuardSample lo, GuardSample hi,
+                                   double tolerance) const
 {
     const double end = hi.s;
     double size = detail::larger(detail::larger(0, lo.value), hi.value);

@@ -40,6 +40,8 @@ double hermite_root(double v0, double r0, double v1, double r1, double sign) noe
 
 namespace {
 
+using detail::Location;
+
 /// Number of consecutive corrections that may fail to halve the one before.
 constexpr int most_linear = 4;
 
@@ -328,7 +330,8 @@ Location Search::run()
 
 }  // namespace
 
-Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
+detail::Location Newton::locate(GuardPath& path, GuardSample lo, GuardSample hi,
+                                double tolerance) const
 {
     return Search(path, {lo, hi}, tolerance).run();
 }

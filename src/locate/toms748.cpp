@@ -18,7 +18,8 @@ constexpr double negligible_part = 0x1p-10;
 
 }  // namespace
 
-Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi, double tolerance) const
+detail::Location Toms748::locate(GuardPath& path, GuardSample lo, GuardSample hi,
+                                 double tolerance) const
 {
     const auto narrow_enough = [&](double a, double b) {
         const double middle = a + (b - a) / 2;

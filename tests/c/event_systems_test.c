@@ -198,6 +198,13 @@ static const struct machine machines[] = {
      .expected = {.events = 2, .times = {1, 1}}, .tick = 1, .at_tick = pull},
     {"standing, guard", 3, 2, 0, cart, cart_and_clock, push, {0}, 2.5,
      .expected = {.events = 4, .times = {1, 1, 2, 2}, .x = {0, 0, 0.5}}},
+    {"standing, tick, either", 2, 1, 0, glides, itself, hold, {0}, 2,
+     .expected = {.events = 2, .times = {1, 1}}, .tick = 1, .at_tick = pull, .crossing = RC_EITHER},
+    {"standing, tick, recorded", 2, 1, 0, glides, itself, hold, {0}, 2,
+     .expected = {.events = 2, .times = {1, 1}, .x = {-1, -1}},
+     .tick = 1, .at_tick = pull, .recorded = 1},
+    {"standing, guard, recorded", 3, 2, 0, cart, cart_and_clock, push, {0}, 1.5,
+     .expected = {.events = 2, .times = {1, 1}, .x = {-0.5, -1, 0.5}}, .recorded = 1},
 };
 /* clang-format on */
 

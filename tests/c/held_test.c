@@ -59,6 +59,21 @@ static void a_run_that_continues_from_a_rest_is_held_again(void)
     }
 }
 
+static void a_run_that_begins_at_rest_says_why_it_moves_on(void)
+{
+    const double at_rest[4] = {1.5, 0, 1, 0};
+    const struct machine machine = thrown(2.5);
+    const rc_options options = options_of(&machine, RC_DOPRI5);
+    rc_simulation* simulation = simulation_of(&machine, at_rest, &options);
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    CHECK(rc_state(simulation)[1] < -1);
+    CHECK(strstr(rc_describe(simulation),
+                 "guard 0 began on its surface and moved on beyond it, "
+                 "which is no event (`continues` holds again"));
+    CHECK(!strstr(rc_describe(simulation), "began beyond"));
+    rc_simulation_free(simulation);
+}
+
 static void a_restart_of_a_rest_is_held_unless_it_moves_what_is_held(void)
 {
     const struct machine machine = thrown(4);
@@ -123,6 +138,7 @@ static void a_run_that_is_saved_after_a_release_is_the_same_run(void)
 int main(void)
 {
     a_run_that_continues_from_a_rest_is_held_again();
+    a_run_that_begins_at_rest_says_why_it_moves_on();
     a_restart_of_a_rest_is_held_unless_it_moves_what_is_held();
     a_veto_sets_the_ball_free();
     a_run_that_is_saved_after_a_release_is_the_same_run();

@@ -31,6 +31,7 @@ struct machine {
     double tick;                               /* [s] above 0 */
     void (*at_tick)(rc_mode* m, double* x);
     int32_t crossing, boolean;
+    size_t recorded; /* the first of the guards, which only record */
     uint64_t stop_after;
     double window; /* [s] */
     struct expected expected;
@@ -140,6 +141,7 @@ static inline rc_simulation* simulation_of(const struct machine* machine, const 
         infos[i].size = sizeof infos[i];
         infos[i].crossing = machine->crossing;
         infos[i].boolean = machine->boolean;
+        infos[i].notifies = i < machine->recorded;
         infos[i].stop_after = machine->stop_after;
     }
     callbacks.dimension = machine->n;

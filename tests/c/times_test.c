@@ -135,6 +135,49 @@ static void timers_that_are_due_together_each_happen(void)
     rc_simulation_free(simulation);
 }
 
+static int two_spikes(void* user, size_t which, rc_mode mode, double t, const double* x, size_t n,
+                      double* g)
+{
+    (void)user, (void)which, (void)mode, (void)t, (void)n;
+    *g = 1.5 - x[0];
+    return 0;
+}
+
+/* The second spike ends the run; the third is due at the same time, and happens where it goes on.
+ */
+static void a_timer_that_is_due_where_a_run_goes_on_happens_there(void)
+{
+    const double start[] = {0, 1, 1, 1};
+    rc_options options = options_until(2);
+    rc_callbacks callbacks = dosed();
+    rc_guard_info info;
+    rc_simulation *simulation, *next;
+    memset(&info, 0, sizeof info);
+    info.size = sizeof info;
+    info.notifies = 1;
+    info.stop_after = 1;
+    callbacks.dimension = 4;
+    callbacks.next_time_event_at = first_due;
+    callbacks.time_reset = spike;
+    callbacks.guard_count = 1;
+    callbacks.guard = two_spikes;
+    callbacks.guard_infos = &info;
+    simulation = simulation_of(&callbacks, start, &options);
+    CHECK(rc_outcome(simulation) == RC_STOPPED_BY_EVENT);
+    CHECK(rc_time(simulation) == 1 && rc_state(simulation)[0] == 2);
+
+    options.t_start = 1;
+    options.continues = 1;
+    next = simulation_of(&callbacks, rc_state(simulation), &options);
+    CHECK(rc_state(next)[0] == 3 && rc_event_count(next) == 1);
+    rc_simulation_free(next);
+
+    CHECK_STATUS(RC_OK, rc_restart(simulation, 1, rc_state(simulation), 4, 0));
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    CHECK(rc_state(simulation)[0] == 3 && rc_event_count(simulation) == 4);
+    rc_simulation_free(simulation);
+}
+
 /* A level that falls. */
 
 static int drains(void* user, rc_mode mode, double t, const double* x, double* dxdt, size_t n)
@@ -287,6 +330,7 @@ int main(void)
     lists_include_both_ends_and_every_entry();
     clocks_tick_from_start_to_end();
     timers_that_are_due_together_each_happen();
+    a_timer_that_is_due_where_a_run_goes_on_happens_there();
     guards_fire_at_the_start_if_asked();
     a_reset_ends_a_run_without_an_end();
     a_number_that_looks_like_a_stop_is_an_error();

@@ -21,6 +21,10 @@
 
 namespace ricochet::test {
 
+using detail::opposite;
+using detail::Screening;
+using detail::side_of;
+
 /// A guard over a step from 0 to 1: its values and its rates.
 struct Curve {
     std::function<double(double)> value, rate;

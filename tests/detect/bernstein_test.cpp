@@ -23,6 +23,11 @@
 namespace ricochet::bernstein_test {
 namespace {
 
+using detail::counts;
+using detail::Finding;
+using detail::opposite;
+using detail::Watch;
+
 using std::numbers::pi;
 using test::HostStep;
 using test::look;

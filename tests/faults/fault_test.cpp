@@ -109,7 +109,7 @@ TEST(FaultStiffness, SpectrumHoldsTheEigenvalues)
         const Eigen::MatrixXd k = dense_matrix(fault.stiffness());
         EXPECT_LT((k - k.transpose()).norm(), 1e-13 * k.norm());
         const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(k);
-        const Spectrum spectrum = fault.stiffness().spectrum();
+        const detail::Spectrum spectrum = fault.stiffness().spectrum();
         EXPECT_LE(spectrum.lower, solver.eigenvalues().minCoeff());
         EXPECT_GE(spectrum.lower, 0.9 * solver.eigenvalues().minCoeff());
         EXPECT_GE(spectrum.upper, solver.eigenvalues().maxCoeff());

@@ -7,6 +7,9 @@
 namespace ricochet::guard_test {
 namespace {
 
+using detail::opposite;
+using detail::triggers;
+
 TEST(Guard, AFallingCrossingTriggersOnlyFromAbove)
 {
     EXPECT_TRUE(triggers(Side::above, -1, Crossing::falling));

@@ -53,8 +53,22 @@ EVERYDAY(Edge)
 EVERYDAY(Network)
 EVERYDAY(Bounded)
 EVERYDAY(Stop)
+EVERYDAY(Watch)
+EVERYDAY(Finding)
+EVERYDAY(Screening)
+EVERYDAY(Path)
+EVERYDAY(Location)
+EVERYDAY(Recipe)
+EVERYDAY(Spectrum)
+EVERYDAY(Metering)
 
 #undef EVERYDAY
+
+// Variables, which the name of a function would hide as well.
+constexpr int counts = 1, dimension = 2, features = 3, opposite = 4, triggers = 5, offers = 6;
+constexpr int size = 7, state = 8, rate = 9, step = 10;
+static_assert(counts + dimension + features + opposite + triggers + offers == 21);
+static_assert(size + state + rate + step == 34);
 
 struct Ball {
     using State = std::array<double, 2>;

@@ -44,12 +44,11 @@ TEST(GuardLife, APlateauAwaitsTheDepartureThatCounts)
 {
     using life::awaited_side;
     const GuardInfo falling, rising{.crossing = Crossing::rising}, floor{.unilateral = true};
-    EXPECT_EQ(awaited_side(Cause::stood, floor, true, Side::below), Side::above);
-    EXPECT_EQ(awaited_side(Cause::fired, falling, true, Side::above), Side::plateau);
-    EXPECT_EQ(awaited_side(Cause::stood, falling, true, Side::below), Side::below);
-    EXPECT_EQ(awaited_side(Cause::enabled, falling, true, Side::below), Side::above);
-    EXPECT_EQ(awaited_side(Cause::enabled, rising, true, Side::above), Side::below);
-    EXPECT_EQ(awaited_side(Cause::enabled, rising, false, Side::above), Side::above);
+    EXPECT_EQ(awaited_side(Cause::stood, floor, Side::below), Side::above);
+    EXPECT_EQ(awaited_side(Cause::fired, falling, Side::above), Side::plateau);
+    EXPECT_EQ(awaited_side(Cause::stood, falling, Side::below), Side::below);
+    EXPECT_EQ(awaited_side(Cause::enabled, falling, Side::below), Side::above);
+    EXPECT_EQ(awaited_side(Cause::enabled, rising, Side::above), Side::below);
 }
 
 /// Two components that move at constant rates in each of three modes, and guards on them.

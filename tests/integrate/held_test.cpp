@@ -213,6 +213,45 @@ TEST(Held, ARestartBeyondASurfaceIsCounted)
     EXPECT_EQ(run.armed_beyond, std::vector<std::size_t>{0});
 }
 
+TEST(Held, ARunThatBeginsAtRestSaysWhyItMovesOnAndWhatHoldsIt)
+{
+    // Where a run ended at rest, another one begins: by itself it falls, 5 (4 - 1.5)^2 = 31.25 m.
+    const auto first = integrate(Thrown{}, {0, 0.1, 1, 0}, {.t_end = 1.5});
+    const auto again = [&](const auto& system, bool continues) {
+        return integrate(system, first.x, {.t_start = 1.5, .t_end = 4, .continues = continues});
+    };
+    const auto falls = again(Thrown{}, false);
+    EXPECT_NEAR(falls.x[1], -31.25, 1e-12);
+    EXPECT_EQ(falls.armed_beyond, std::vector<std::size_t>{0});
+    EXPECT_EQ(falls.armed_on_surface, std::vector<std::size_t>{0});
+    EXPECT_EQ(
+        describe(falls),
+        "the end time was reached; guard 0 began on its surface and moved on beyond it, which "
+        "is no event (`continues` holds again what was at rest, unilateral and at_start "
+        "give it one)");
+    // What the sentence says is so.
+    EXPECT_EQ(again(Thrown{}, true).x[1], 0);
+    EXPECT_EQ(describe(again(Thrown{}, true)), describe(Outcome::reached_end));
+    struct Unilateral : Thrown {
+        bool unilateral = true;
+    };
+    EXPECT_EQ(again(Unilateral{}, false).x[1], 0);
+    struct AtStart : Thrown {
+        [[nodiscard]] static GuardInfo guard_info() { return {.at_start = true}; }
+    };
+    EXPECT_EQ(again(AtStart{}, false).events.size(), 1U);
+
+    // Beyond the surface is another matter; of a guard that began in both ways the last one counts.
+    Simulation simulation(Thrown{}, first.x, {.t_start = 1.5, .t_end = 4});
+    simulation.restart(2, {1.5, -1, 1, 0});
+    const auto beyond = simulation.take();
+    EXPECT_EQ(beyond.armed_beyond, std::vector<std::size_t>{0});
+    EXPECT_TRUE(beyond.armed_on_surface.empty());
+    EXPECT_EQ(describe(beyond),
+              "the end time was reached; guard 0 began beyond its surface, and waited until it had "
+              "returned (at_start and at_entry let it fire there)");
+}
+
 TEST(Held, ARunThatIsSavedAfterAReleaseIsTheSameRun)
 {
     // The first ball is lifted off its floor while the second still bounces.

@@ -714,6 +714,80 @@ TEST(Meaning, AHostsGuardThatAnotherOneMovesOutwardHasItsEvent)
     EXPECT_EQ(host.x[0], 0);
 }
 
+/// x = 0, which a tick, or the guard of the clock y' = 1, sets in motion at 1: by the velocity v,
+/// or by a mode whose flow adds `push`. Guard 0 is x.
+struct SetInMotion {
+    using State = Array<3>;  // x, v, y
+    std::size_t guard_count = 2;
+    std::size_t mode_count = 2;
+    GuardInfo info;
+    double push;
+    bool by_tick, by_mode;
+    Times time_events{by_tick ? 1.0 : 9.0};
+
+    void flow(Mode mode, double, const State& x, State& dxdt) const
+    {
+        dxdt = {x[1] + (mode == 1 ? push : 0), 0, 1};
+    }
+    [[nodiscard]] double guard(std::size_t i, Mode, double, const State& x) const
+    {
+        return i == 0 ? x[0] : by_tick ? 1 : 1 - x[2];
+    }
+    [[nodiscard]] GuardInfo guard_info(std::size_t i) const { return i == 0 ? info : GuardInfo{}; }
+    Mode time_reset(Mode mode, double, State& x) const
+    {
+        if (!by_mode) x[1] = push;
+        return by_mode ? 1 : mode;
+    }
+    Mode reset(std::size_t i, Mode mode, double t, State& x) const
+    {
+        if (i == 1) return time_reset(mode, t, x);
+        x[1] = mode == 1 ? -push : 0;  // it stops
+        return mode;
+    }
+};
+
+TEST(Meaning, AGuardThatIsSetInMotionHasItsEventWhateverItDoesAndWhicheverDirectionCounts)
+{
+    const auto expect = [](const SetInMotion& system, std::size_t events, const char* what) {
+        const std::string which = std::string(what) + (system.by_tick ? " tick" : " guard") +
+                                  (system.by_mode ? " mode " : " state ") +
+                                  std::to_string(system.push) + " crossing " +
+                                  std::to_string(static_cast<int>(system.info.crossing));
+        const auto check = [&](const auto& run, const std::string& label) {
+            std::size_t found = 0;
+            for (const auto& event : run.events) {
+                if (event.guard != 0) continue;
+                ++found;
+                EXPECT_NEAR(event.t, 1, 1e-13) << label << which;
+                EXPECT_EQ(event.kind, EventKind::crossing) << label << which;
+            }
+            EXPECT_EQ(found, events) << label << which;
+        };
+        by_all(system, Array<3>{0, 0, 0}, {.t_end = 3}, check);
+        EventMonitor monitor(system, Array<3>{});
+        check(test::drive(system, monitor, Array<3>{0, 0, 0}, 3, 0.1), "host ");
+    };
+    for (const bool by_tick : {true, false}) {
+        for (const bool by_mode : {true, false}) {
+            for (const double push : {-1.0, 1.0}) {
+                for (const Crossing crossing :
+                     {Crossing::falling, Crossing::rising, Crossing::either}) {
+                    const bool counts = crossing == Crossing::either ||
+                                        (crossing == Crossing::falling) == (push < 0);
+                    SetInMotion system{.push = push, .by_tick = by_tick, .by_mode = by_mode};
+                    system.info = {.crossing = crossing};
+                    expect(system, counts, "reset");
+                    system.info = {.crossing = crossing, .resets = false};
+                    expect(system, counts, "recorded");
+                    system.info = {.crossing = crossing, .resets = false, .stop_after = 1};
+                    expect(system, counts, "terminal");
+                }
+            }
+        }
+    }
+}
+
 TEST(Meaning, BallsThatTouchPassAStrokeOnAtOneInstant)
 {
     // Three equal balls in a row, the second and the third in contact at exactly zero. Each contact

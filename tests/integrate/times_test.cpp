@@ -236,9 +236,46 @@ TEST(Timers, OneThatLiesInThePastIsRefused)
               "integrate: next_time_event(t, x) must return t or a time after it, or infinity; at "
               "the start t = 0 it returned -1");
     EXPECT_THROW((void)integrate(Stuck{std::nan("")}, {0}, {.t_end = 2}), std::invalid_argument);
-    // In a run that continues the start belongs to the run before.
-    EXPECT_THROW((void)integrate(Stuck{0}, {0}, {.t_end = 2, .continues = true}),
+    EXPECT_THROW((void)integrate(Stuck{-1}, {0}, {.t_end = 2, .continues = true}),
                  std::invalid_argument);
+}
+
+/// Spikes whose count ends the run at its second: more may be due at the same time.
+struct CountedSpikes : Spikes {
+    [[nodiscard]] double guard(double, const State& x) const { return 1.5 - x[0]; }
+    [[nodiscard]] GuardInfo guard_info() const { return {.resets = false, .stop_after = 1}; }
+};
+
+TEST(Timers, DueWhereARunGoesOnHappenThereOnce)
+{
+    // The run ends between the second of three spikes and the third, which is still in the state:
+    // an event that has happened has moved its timer on, and no other record of it is needed.
+    const CountedSpikes spikes;
+    const std::vector<double> start{0, 1, 1, 1};
+    const auto first = integrate(spikes, start, {.t_end = 2});
+    ASSERT_EQ(first.outcome, Outcome::stopped_by_event);
+    ASSERT_EQ(first.x[0], 2);
+
+    const auto second = integrate(spikes, first.x, {.t_start = 1, .t_end = 2, .continues = true});
+    EXPECT_EQ(second.x[0], 3);
+    EXPECT_EQ(times_of(second.events), std::vector<double>{1});
+
+    Simulation simulation(spikes, start, {.t_end = 2});
+    while (simulation.advance()) continue;
+    simulation.restart(simulation.t(), simulation.x());
+    while (simulation.advance()) continue;
+    const auto whole = simulation.finish();
+    EXPECT_EQ(whole.x, second.x);
+    EXPECT_EQ(whole.statistics.events, 4U);
+}
+
+TEST(Timers, ThatHaveFiredAtTheJointOfTwoRunsDoNotFireAgain)
+{
+    const Spikes spikes;
+    const auto first = integrate(spikes, std::vector<double>{0, 1, 1, 2}, {.t_end = 1});
+    EXPECT_EQ(first.x[0], 2);
+    const auto second = integrate(spikes, first.x, {.t_start = 1, .t_end = 2, .continues = true});
+    EXPECT_EQ(times_of(second.events), std::vector<double>{2});
 }
 
 TEST(Timers, OneThatIsAlwaysDueAgainIsAnEndlessCascade)

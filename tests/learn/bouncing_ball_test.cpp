@@ -24,14 +24,14 @@ class Stored {
 public:
     explicit Stored(const std::string& file)
         : classifier_(load_model(std::filesystem::path(RICOCHET_MODELS) / file)),
-          recipe_(recipe_named(classifier_.model().recipe))
+          recipe_(ricochet::detail::recipe_named(classifier_.model().recipe))
     {
     }
 
     [[nodiscard]] bool alarm(const BouncingBall& ball, const State& x, double h) const
     {
         std::array<double, 2> row{};
-        features(recipe_, ball, x, h, row.data());
+        ricochet::detail::features(recipe_, ball, x, h, row.data());
         return classifier_.alarm(classifier_.logit(row.data()));
     }
 
@@ -40,7 +40,7 @@ public:
 
 private:
     Classifier classifier_;
-    Recipe recipe_;
+    ricochet::detail::Recipe recipe_;
 };
 
 const Stored& fixed_step()

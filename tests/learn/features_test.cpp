@@ -14,6 +14,13 @@
 namespace ricochet::features_test {
 namespace {
 
+using detail::dimension;
+using detail::features;
+using detail::offers;
+using detail::Recipe;
+using detail::recipe_named;
+using detail::slog;
+
 using State = std::array<double, 2>;
 
 /// A guard without a declared curvature, or anything else.

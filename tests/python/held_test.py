@@ -1,5 +1,7 @@
 """What a rest holds, and what goes on from there: runs that continue, restarts, vetoes, snapshots."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,18 @@ def test_a_run_that_continues_from_a_rest_is_held_again(method, unilateral):
     assert run.statistics.armed_beyond == 0
     np.testing.assert_allclose(run.x, [4, 0, 1, 0], atol=1e-12)
     assert run.x[1] == run.x[3] == 0
+
+
+def test_a_run_that_begins_at_rest_says_why_it_moves_on():
+    at_rest = ricochet.integrate(thrown(), START, 1.5).x
+    run = ricochet.integrate(thrown(), at_rest, 2.5, t_start=1.5)
+    assert run.x[1] < -1 and run.statistics.armed_beyond == 1
+    assert run.message.startswith("the end time was reached; began on their surface and moved on beyond "
+                                  "it, which is no event (continues holds again what was at rest")
+    assert pickle.loads(pickle.dumps(run)).message == run.message
+    beyond = ricochet.integrate(thrown(), [1.5, -1.0, 1.0, 0.0], 2.5, t_start=1.5)
+    assert "began beyond their surface" in beyond.message and "began on" not in beyond.message
+    assert ricochet.integrate(thrown(unilateral=True), at_rest, 2.5, t_start=1.5).x[1] == 0
 
 
 def test_a_restart_of_a_rest_is_held_unless_it_moves_what_is_held():

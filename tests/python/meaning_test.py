@@ -183,6 +183,22 @@ def test_a_tick_that_moves_a_standing_guard_outward_gives_it_its_event(method, d
     assert run.events["t"].tolist() == [1, 1] and run.x[0] == 0
 
 
+@pytest.mark.parametrize("by_tick", [True, False])
+@pytest.mark.parametrize("kind", ["recorded", "terminal", "reset"])
+@pytest.mark.parametrize(("push", "direction"), [(-1.0, -1), (-1.0, 0), (1.0, 1), (1.0, 0)])
+def test_a_standing_guard_has_its_event_whatever_it_does(by_tick, kind, push, direction):
+    more = {"recorded": {}, "terminal": {"stop_after": 1}, "reset": {"reset": lambda t, x: [x[0], 0.0, x[2]]}}
+    clock = ricochet.Guard(lambda t, x: 1 - x[2], reset=lambda t, x: [x[0], push, x[2]])
+    timed = {"time_events": [1.0], "time_reset": lambda t, x: [x[0], push, x[2]]}
+    system = ricochet.System(
+        lambda t, x: [x[1], 0.0, 1.0],
+        [ricochet.Guard(lambda t, x: x[0], direction=direction, **more[kind])] + ([] if by_tick else [clock]),
+        **(timed if by_tick else {}))
+    run = ricochet.integrate(system, [0.0, 0.0, 0.0], 2.0)
+    assert list(run.events["guard"]).count(0) == 1
+    np.testing.assert_allclose(run.events["t"], [1, 1], atol=1e-13)
+
+
 @pytest.mark.parametrize("by_state", [True, False])
 @pytest.mark.parametrize("method", ["RK45", "DOP853"])
 def test_another_event_that_moves_a_standing_guard_outward_gives_it_its_event(method, by_state):

@@ -123,6 +123,24 @@ def test_spikes_that_are_due_together_each_happen():
     assert list(ricochet.integrate(system, [0.0, 0.0, 1.0], 2.0).events["t"]) == [0, 1]
 
 
+def test_a_timer_that_is_due_where_a_run_goes_on_happens_there():
+    # The second spike ends the run; the third is due at the same time, and still in the state.
+    def spike(t, x):
+        x[1 + x[1:].argmin()] = 1e9
+        x[0] += 1
+        return x
+
+    system = System(still, [Guard(lambda t, x: 1.5 - x[0], stop_after=1)],
+                    next_time_event=lambda t, x: min(x[1:]), time_reset=spike)
+    simulation = ricochet.Simulation(system, [0.0, 1.0, 1.0, 1.0], 2.0)
+    first = simulation.run_to_end()
+    assert first.outcome == "stopped_by_event" and first.t == 1 and first.x[0] == 2
+    second = ricochet.integrate(system, first.x, 2.0, t_start=1.0, continues=True)
+    assert second.x[0] == 3 and list(second.events["t"]) == [1]
+    simulation.restart(1.0, first.x)
+    assert simulation.run_to_end().x[0] == 3
+
+
 def test_a_timer_that_stays_due_ends_the_run():
     system = System(still, next_time_event=lambda t, x: 1.0)
     run = ricochet.integrate(system, [0.0], 2.0)

@@ -17,7 +17,7 @@ namespace ricochet {
 /// rounding for a falling guard of constant negative curvature.
 struct BallisticLine {
     static constexpr bool uses_rates = false;
-    static constexpr Screening screening = Screening::ends;
+    static constexpr detail::Screening screening = detail::Screening::ends;
     static constexpr Evidence evidence = Evidence::assumed;  ///< of a step not suspected
     static constexpr bool checks_every_step = false;
 
@@ -53,7 +53,7 @@ struct BallisticLine {
         return false;
     }
 
-    [[nodiscard]] Finding examine(GuardPath& probe, Watch& watch) const
+    [[nodiscard]] detail::Finding examine(GuardPath& probe, detail::Watch& watch) const
     {
         return detail::examine_prediction(probe, watch);
     }

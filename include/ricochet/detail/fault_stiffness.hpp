@@ -19,13 +19,13 @@ namespace ricochet {
 namespace detail {
 struct StiffnessData;
 class StiffnessTransforms;
-}  // namespace detail
 
 /// An interval that holds the eigenvalues of a matrix.
 struct Spectrum {
     double lower = 0;
     double upper = 0;
 };
+}  // namespace detail
 
 /// A stiffness matrix. A value: copies share their entries, which never change.
 class FaultStiffness {
@@ -56,7 +56,7 @@ public:
     /// of all its parts; the lower one is 0.97 times the result of 80 steps of Lanczos, which
     /// converge from above.
     /// @throws std::invalid_argument where the lower bound is not positive.
-    [[nodiscard]] Spectrum spectrum() const;
+    [[nodiscard]] detail::Spectrum spectrum() const;
 
     /// The solution of K x = b by conjugate gradients, to 1e-13 of |b|.
     /// @throws std::invalid_argument if K is not positive definite.

@@ -20,6 +20,8 @@
 
 namespace ricochet {
 
+namespace detail {
+
 enum class Recipe {
     state,      ///< the components of x, as they are
     ballistic,  ///< the guard's height and rate in units of what its curvature does in one step
@@ -47,7 +49,6 @@ enum class Recipe {
     return recipe == Recipe::state ? state_size : 2;
 }
 
-namespace detail {
 template <class System, class X>
 concept CurvatureWritten = requires(const System& system, double t, const X& x)
 {
@@ -74,6 +75,8 @@ template <class System, class X>
 concept CurvedGuard = RatedGuard<System, X> &&
     (detail::CurvatureWritten<System, X> || detail::curvature_takes_duals<System, X>);
 
+namespace detail {
+
 /// Whether `recipe` can be computed for states of type X of a system.
 template <class System, class X>
 [[nodiscard]] constexpr bool offers(Recipe recipe) noexcept
@@ -81,15 +84,11 @@ template <class System, class X>
     return recipe == Recipe::state || CurvedGuard<System, X>;
 }
 
-namespace detail {
-
 /// 1 / x for x >= 0, the largest double instead of infinity; NaN stays NaN.
 [[nodiscard]] inline double saturated_reciprocal(double x) noexcept
 {
     return least_of(1 / x, std::numeric_limits<double>::max());
 }
-
-}  // namespace detail
 
 /// A signed logarithm, sign(a) L(1 + |a| / a0) with a0 = 1/2, where L is log2 at
 /// the powers of two and linear between them:
@@ -107,7 +106,7 @@ namespace detail {
 {
     constexpr double a0 = 0.5;
     constexpr auto one = std::bit_cast<std::int64_t>(1.0);
-    const double y = detail::least_of(std::abs(a) * (1 / a0), std::numeric_limits<double>::max());
+    const double y = least_of(std::abs(a) * (1 / a0), std::numeric_limits<double>::max());
     const std::int64_t above_one = std::bit_cast<std::int64_t>(1 + y) - one;
     const double if_nan = y - y;
     return std::copysign(static_cast<double>(above_one) * 0x1p-52 + if_nan, a);
@@ -149,12 +148,11 @@ void features(Recipe recipe, const System& system, const StepAhead<X>& step, dou
         return;
     }
     if constexpr (CurvedGuard<System, X>) {
-        const double per_step = detail::saturated_reciprocal(step.h);
-        const double per_speed = detail::saturated_reciprocal(
-            std::abs(detail::curvature_of(system, step.t, x)) * step.h);
+        const double per_step = saturated_reciprocal(step.h);
+        const double per_speed =
+            saturated_reciprocal(std::abs(curvature_of(system, step.t, x)) * step.h);
         out[0] = slog(system.guard(step.t, x) * per_speed * per_step);
-        out[1] = slog(detail::call_rate(system, 0, detail::Along{Mode{0}, step.t, x, step.dxdt}) *
-                      per_speed);
+        out[1] = slog(call_rate(system, 0, Along{Mode{0}, step.t, x, step.dxdt}) * per_speed);
     } else {
         out[0] = out[1] = std::numeric_limits<double>::quiet_NaN();
     }
@@ -169,5 +167,7 @@ void features(Recipe recipe, const System& system, const X& x, double h, double*
     if (recipe != Recipe::state) system.flow(0, x, dxdt);
     features(recipe, system, StepAhead<X>{0, x, dxdt, h}, out);
 }
+
+}  // namespace detail
 
 }  // namespace ricochet

@@ -7,7 +7,7 @@
 #include "ricochet/hybrid/guard.hpp"
 #include "ricochet/integrate/run.hpp"
 
-namespace ricochet {
+namespace ricochet::detail {
 
 /// A detector that requests one evaluation of every guard inside each step, so that a guard
 /// that the step does not resolve is discovered.
@@ -84,4 +84,4 @@ struct Finding {
     }
 };
 
-}  // namespace ricochet
+}  // namespace ricochet::detail

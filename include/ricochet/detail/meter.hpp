@@ -68,14 +68,14 @@ struct MeterReading {
     }
 };
 
+namespace detail {
+
 /// A detector whose network is metered.
 template <class Detector>
 concept Metering = requires(const Detector& detector)
 {
     detector.metering();
 };
-
-namespace detail {
 
 /// @throws std::invalid_argument naming the option.
 void validate(const MeterOptions& options);

@@ -18,11 +18,12 @@ public:
 
     StiffnessSeries() = default;
     /// The first `degree` + 1 terms of the series of f on `interval`.
-    StiffnessSeries(const Function& f, Spectrum interval, int degree);
+    StiffnessSeries(const Function& f, detail::Spectrum interval, int degree);
     /// The least degree for which a polynomial is found within `bound` of f, relative to f,
     /// which is positive on the interval: the best one, by Remez's exchange, or the series.
     /// @throws std::invalid_argument where none up to `most_terms` is found.
-    [[nodiscard]] static StiffnessSeries within(const Function& f, Spectrum interval, double bound);
+    [[nodiscard]] static StiffnessSeries within(const Function& f, detail::Spectrum interval,
+                                                double bound);
     static constexpr int most_terms = 400;
 
     /// Becomes constant + slope x + factor p(x), in the memory that it has.
@@ -41,7 +42,7 @@ public:
                Scratch& scratch) const;
 
 private:
-    Spectrum interval_;
+    detail::Spectrum interval_;
     std::vector<double> c_;
 };
 

@@ -70,7 +70,7 @@ struct BernsteinTask {
 /// place of the largest and the declared degree is right. Costs steps without dense output.
 struct Bernstein {
     static constexpr bool uses_rates = true;
-    static constexpr Screening screening = Screening::every;
+    static constexpr detail::Screening screening = detail::Screening::every;
     static constexpr Evidence evidence = Evidence::proved;  ///< for steps without armed guards
 
     /// Returns true: every step needs a check.
@@ -89,7 +89,7 @@ struct Bernstein {
         return false;
     }
 
-    [[nodiscard]] Finding examine(GuardPath& path, Watch& watch) const;
+    [[nodiscard]] detail::Finding examine(GuardPath& path, detail::Watch& watch) const;
 };
 
 }  // namespace ricochet

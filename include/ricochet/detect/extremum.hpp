@@ -17,7 +17,7 @@ namespace ricochet {
 /// Two crossings within one step cancel and are not found.
 struct Ends {
     static constexpr bool uses_rates = false;
-    static constexpr Screening screening = Screening::ends;
+    static constexpr detail::Screening screening = detail::Screening::ends;
     static constexpr Evidence evidence = Evidence::assumed;  ///< evidence for a step not suspected
 
     /// Whether a step needs a check, from the guard times `sign`, which is positive on its
@@ -37,28 +37,28 @@ struct Ends {
 
     /// Where the guard is zero at the end, bit for bit, its values around there tell whether it
     /// crosses or turns back.
-    [[nodiscard]] Finding examine(GuardPath& path, Watch& watch) const
+    [[nodiscard]] detail::Finding examine(GuardPath& path, detail::Watch& watch) const
     {
         if (watch.end.value == 0 && watch.side != Side::plateau && turns_back(path, watch)) {
             watch.side_after = watch.side;
-            return Finding::clear(Evidence::assumed);
+            return detail::Finding::clear(Evidence::assumed);
         }
         return compare_signs(path, watch);
     }
 
     /// Finding from the sides alone; zero belongs to either.
-    [[nodiscard]] static Finding compare_signs(const GuardPath& path, Watch& watch)
+    [[nodiscard]] static detail::Finding compare_signs(const GuardPath& path, detail::Watch& watch)
     {
-        const bool left = has_left(watch.side, watch.end.value);
-        watch.side_after = left ? opposite(watch.side) : watch.side;
-        if (left && counts(watch.side, path.crossing())) {
-            return Finding::leaving(watch.side, watch.start, watch.end);
+        const bool left = detail::has_left(watch.side, watch.end.value);
+        watch.side_after = left ? detail::opposite(watch.side) : watch.side;
+        if (left && detail::counts(watch.side, path.crossing())) {
+            return detail::Finding::leaving(watch.side, watch.start, watch.end);
         }
-        return Finding::clear(Evidence::assumed);
+        return detail::Finding::clear(Evidence::assumed);
     }
 
 private:
-    [[nodiscard]] static bool turns_back(GuardPath& path, const Watch& watch);
+    [[nodiscard]] static bool turns_back(GuardPath& path, const detail::Watch& watch);
 };
 
 // The classical approach: the guard and its rate at both ends of the step.
@@ -73,7 +73,7 @@ private:
 /// cubic through values and rates, and searches for extrema if that leaves doubts: the default.
 struct Extremum {
     static constexpr bool uses_rates = true;
-    static constexpr Screening screening = Screening::extremum;
+    static constexpr detail::Screening screening = detail::Screening::extremum;
     static constexpr bool checks_inside = true;  ///< compares each step with the cubic of its ends
     static constexpr Evidence evidence = Evidence::checked;  ///< evidence for a step not suspected
 
@@ -113,7 +113,7 @@ struct Extremum {
         return sign * end.value < -touch && !(b1 < 0 && b2 > 0) && std::isfinite(b1 + b2);
     }
 
-    [[nodiscard]] Finding examine(GuardPath& path, Watch& watch) const;
+    [[nodiscard]] detail::Finding examine(GuardPath& path, detail::Watch& watch) const;
 };
 
 }  // namespace ricochet

@@ -65,7 +65,7 @@ void check_model_step(const Model& model, double smallest, double largest);
 class BareNetwork {
 public:
     static constexpr bool uses_rates = false;
-    static constexpr Screening screening = Screening::ends;
+    static constexpr detail::Screening screening = detail::Screening::ends;
     static constexpr Evidence evidence = Evidence::assumed;  ///< evidence for a step not suspected
     static constexpr bool checks_every_step = false;
     static constexpr std::size_t max_features = 16;
@@ -97,8 +97,8 @@ public:
             }
             detail::check_model_parameter(model(), parameter, trained, value);
         }
-        detail::check_model_features(model(), recipe_, dimension(recipe_, x.size()),
-                                     offers<System, X>(recipe_));
+        detail::check_model_features(model(), recipe_, detail::dimension(recipe_, x.size()),
+                                     detail::offers<System, X>(recipe_));
         detail::check_model_step(model(), smallest, largest);
     }
 
@@ -109,9 +109,9 @@ public:
     {
         if (!(step.h() >= model().step_min && step.h() <= model().step_max)) return false;
         std::array<double, max_features> input;
-        if (recipe_ == Recipe::ballistic) guard.count();
-        const StepAhead start{step.time(0), step.x0(), step.rate0(), step.h()};
-        features(recipe_, guard.system(), start, input.data());
+        if (recipe_ == detail::Recipe::ballistic) guard.count();
+        const detail::StepAhead start{step.time(0), step.x0(), step.rate0(), step.h()};
+        detail::features(recipe_, guard.system(), start, input.data());
         return classifier_->in_domain(input.data()) &&
                !classifier_->alarm(classifier_->logit(input.data()));
     }
@@ -129,14 +129,14 @@ public:
         return false;
     }
 
-    [[nodiscard]] Finding examine(GuardPath& probe, Watch& watch) const
+    [[nodiscard]] detail::Finding examine(GuardPath& probe, detail::Watch& watch) const
     {
         return detail::examine_prediction(probe, watch);
     }
 
 private:
     detail::Shared<Classifier> classifier_;
-    Recipe recipe_;
+    detail::Recipe recipe_;
 };
 
 // Gates: networks that decide whether the guards of a step are checked.

@@ -68,6 +68,8 @@ concept DenseStep = MethodStep<S, X> && requires(const S& step)
         } -> std::convertible_to<DenseParts<X>>;
 };
 
+namespace detail {
+
 /// Place at which the guard left its side, as offsets [s] from the start of the step.
 struct Location {
     double lo = 0;                                            ///< still on the armed side
@@ -78,6 +80,14 @@ struct Location {
     double error = 0;   ///< [s] width of the bracket, or more where rounding in g is coarser
     bool jump = false;  ///< a change of sign without a zero: a pole, or a jump of the guard
 };
+
+/// Source of the states inside a step.
+enum class Path {
+    restep,  ///< the method's own map from the start of the step
+    dense,   ///< the step's polynomial
+};
+
+}  // namespace detail
 
 /// Narrowest useful bracket at offset s of a step of length h: neighbouring
 /// doubles, or a millionth of their spacing at the end of the step.
@@ -95,12 +105,6 @@ template <class X>
 struct ProbeSpace {
     explicit ProbeSpace(const X& like) : x(like), dxdt(like), root(like) {}
     X x, dxdt, root;
-};
-
-/// Source of the states inside a step.
-enum class Path {
-    restep,  ///< the method's own map from the start of the step
-    dense,   ///< the step's polynomial
 };
 
 /// Properties of a guard on a step that are known before it is evaluated.
@@ -130,14 +134,14 @@ public:
     /// and the guard on it is not known to be the cubic through its ends.
     [[nodiscard]] bool foretells() const noexcept
     {
-        return properties_.is_free && !is_cubic_ && path_ == Path::restep;
+        return properties_.is_free && !is_cubic_ && path_ == detail::Path::restep;
     }
     /// Declares that the guard hardly differs from the cubic through its values and rates at the
     /// ends of the step.
     void take_as_cubic() noexcept { is_cubic_ = true; }
 
     /// Whether samples are taken from the step's polynomial.
-    [[nodiscard]] bool on_polynomial() const noexcept { return path_ == Path::dense; }
+    [[nodiscard]] bool on_polynomial() const noexcept { return path_ == detail::Path::dense; }
 
     /// The side from which a departure is searched for.
     [[nodiscard]] Side side() const noexcept { return side_; }
@@ -152,7 +156,7 @@ public:
     /// Whether the guard of a sample has left the watched side.
     [[nodiscard]] bool has_left(const GuardSample& sample) const noexcept
     {
-        return ricochet::has_left(side_, sample.value);
+        return detail::has_left(side_, sample.value);
     }
 
     /// Narrowest useful bracket near offset s.
@@ -200,7 +204,7 @@ protected:
         double rate;
     };
 
-    GuardPath(const PathProperties& properties, Path path) noexcept
+    GuardPath(const PathProperties& properties, detail::Path path) noexcept
         : properties_(properties), path_(path)
     {
     }
@@ -213,7 +217,7 @@ protected:
     [[nodiscard]] virtual double value_along_the_flow(double from, double s) = 0;
 
     PathProperties properties_;
-    Path path_;
+    detail::Path path_;
     Side side_ = Side::plateau;
     bool settled_ = false;
     bool is_cubic_ = false;
@@ -233,7 +237,7 @@ public:
 
     /// Keeps references to all three.
     StepProbe(const Guard& guard, const Step& step, ProbeSpace<State>& space,
-              Path path = Path::restep) noexcept
+              detail::Path path = detail::Path::restep) noexcept
         : GuardPath({.h = step.h(),
                      .crossing = guard.crossing(),
                      .is_rated = is_rated(guard),
@@ -259,13 +263,13 @@ public:
 
     void settle(double correction) override
     {
-        if (path_ == Path::dense) return;
+        if (path_ == detail::Path::dense) return;
         detail::move(space_->root, space_->x, correction, space_->dxdt);
         settled_ = true;
     }
 
     /// The state at the root that a locator found last.
-    [[nodiscard]] const State& state_at(const Location& where)
+    [[nodiscard]] const State& state_at(const detail::Location& where)
     {
         if (settled_) return space_->root;
         if (!(placed_ == where.root)) place(where.root);
@@ -313,19 +317,19 @@ public:
     [[nodiscard]] bool agree_on(GuardSample& lo, const GuardSample& hi, const GuardSample& start,
                                 Side armed)
     {
-        if (path_ == Path::dense) return true;
+        if (path_ == detail::Path::dense) return true;
         const auto lags = [&] {
-            return start.s > 0 && ricochet::has_left(armed, dense_value(start.s).value);
+            return start.s > 0 && detail::has_left(armed, dense_value(start.s).value);
         };
         if (hi.s != step_->h() && !has_left(value(hi.s))) {
             if (lo.s == start.s && lags()) return false;
-            path_ = Path::dense;
+            path_ = detail::Path::dense;
         } else if (lo.s != start.s && has_left(value(lo.s))) {
             if (side_ == armed) {
                 lo = start;
             } else {
                 if (lags()) return false;
-                path_ = Path::dense;
+                path_ = detail::Path::dense;
             }
         }
         return true;
@@ -345,7 +349,8 @@ private:
     [[nodiscard]] double value_at(double s) override
     {
         if constexpr (may_see) {
-            if (path_ == Path::dense && sees()) return guard_->value(step_->time(s), view(s));
+            if (path_ == detail::Path::dense && sees())
+                return guard_->value(step_->time(s), view(s));
         }
         place(s);
         return guard_->value(step_->time(s), space_->x);
@@ -358,7 +363,7 @@ private:
             if (sees()) return guard_->value(t, view(s));
         }
         step_->interpolate(s, space_->x);
-        placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
+        placed_ = path_ == detail::Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
         return guard_->value(t, space_->x);
     }
 
@@ -378,16 +383,16 @@ private:
         } else {
             step_->flow(s, space_->x, space_->dxdt);
         }
-        placed_ = path_ == Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
+        placed_ = path_ == detail::Path::dense ? s : std::numeric_limits<double>::quiet_NaN();
         return {guard_->value(t, space_->x), guard_->rate(t, space_->x, space_->dxdt, step_->h())};
     }
 
     [[nodiscard]] Point point_at(double s) override
     {
         if constexpr (may_see) {
-            if (path_ == Path::dense && sees()) return dense_point_at(s);
+            if (path_ == detail::Path::dense && sees()) return dense_point_at(s);
         }
-        if (path_ == Path::dense) {
+        if (path_ == detail::Path::dense) {
             place(s);
             step_->flow(s, space_->x, space_->dxdt);
         } else {
@@ -412,7 +417,7 @@ private:
 
     [[nodiscard]] double value_along_the_flow(double from, double s) override
     {
-        if (path_ == Path::dense) return value_at(s);
+        if (path_ == detail::Path::dense) return value_at(s);
         if constexpr (may_see && requires { step_->line(space_->x, space_->dxdt, s); }) {
             // Of a large state only the components that the guard reads are moved.
             if (sees() && space_->x.size() > 64) {
@@ -548,7 +553,7 @@ private:
     /// Computes the state at offset s into the work space.
     void place(double s)
     {
-        if (path_ == Path::dense) {
+        if (path_ == detail::Path::dense) {
             step_->interpolate(s, space_->x);
         } else {
             step_->restep(s, space_->x);
@@ -565,8 +570,8 @@ private:
 /// Runs a detector on a whole step of a host's own integrator, with the guard armed on
 /// `watch.side` and sampled at the start. Fills in its sample at the end.
 template <class Detector, class Guard, class Step>
-[[nodiscard]] Finding examine_step(const Detector& detector, const Guard& guard, const Step& step,
-                                   Watch& watch)
+[[nodiscard]] detail::Finding examine_step(const Detector& detector, const Guard& guard,
+                                           const Step& step, detail::Watch& watch)
 {
     const double h = step.h();
     watch.end = {.s = h, .value = guard.value(step.time(h), step.x1())};

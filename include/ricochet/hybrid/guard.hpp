@@ -67,6 +67,8 @@ struct GuardInfo {
     std::size_t reaction = no_reaction;
 };
 
+namespace detail {
+
 /// The side that a value lies on; plateau for zero.
 [[nodiscard]] constexpr Side side_of(double value) noexcept
 {
@@ -105,6 +107,8 @@ struct GuardInfo {
 {
     return has_left(side, g_end) && counts(side, crossing);
 }
+
+}  // namespace detail
 
 // An event: when a guard crossed its surface, and the states around it.
 

@@ -21,7 +21,8 @@ struct Options {
     Mode mode = 0;  ///< mode at the start
     /// The run goes on where another has ended: t_start belongs to that one, so that nothing
     /// happens there by `Times` of the system or by `GuardInfo::at_start`, and what a rest held is
-    /// held again.
+    /// held again. A timer of `next_time_event(t, x)` that is due there has its event: one that has
+    /// happened has moved it on.
     bool continues = false;
 
     /// [s] Length of the steps of a fixed-step run, where it is required; with error control the

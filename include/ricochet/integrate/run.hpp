@@ -125,8 +125,9 @@ struct Statistics {
     /// guard with a direction would fire again there.
     std::uint64_t either_relays = 0;
     std::size_t relay_guard = no_guard;  ///< the guard of the last of them
-    /// State-changing or terminal guards that were beyond their surface where they were armed: at
-    /// the start, or by a mode that enabled them. They wait until they have returned.
+    /// State-changing or terminal guards that were beyond their surface where they were armed, or
+    /// on it with a motion that goes beyond: at the start, or by a mode that enabled them. They
+    /// wait until they have returned.
     std::uint64_t armed_beyond = 0;
     EvidenceCounts evidence;
 };
@@ -385,6 +386,8 @@ struct Run {
     /// Text of the `StopRun` that ended the run; of `non_finite` the function that was not finite.
     std::string reason;
     std::vector<std::size_t> armed_beyond;  ///< guards that `Statistics::armed_beyond` counts
+    /// Those of them that lay on their surface, where the motion went on beyond it.
+    std::vector<std::size_t> armed_on_surface;
     std::vector<Event<State>> events;
     Trajectory<State> trajectory;  ///< empty unless `Options::sample_times` were given
     Solution<State> solution;      ///< empty without `Options::record_steps`
@@ -406,16 +409,17 @@ namespace detail {
 
 [[nodiscard]] std::string describe_reason(Outcome outcome, const std::string& reason);
 [[nodiscard]] std::string describe_run(Outcome outcome, const std::string& reason,
-                                       const std::vector<std::size_t>& armed_beyond);
+                                       const std::vector<std::size_t>& armed_beyond,
+                                       const std::vector<std::size_t>& armed_on_surface);
 
 }  // namespace detail
 
 /// A sentence about the outcome, with the text of the reset that has ended the run, and one about
-/// guards that were armed beyond their surface.
+/// guards that were armed beyond their surface, or on it.
 template <class State>
 [[nodiscard]] std::string describe(const Run<State>& run)
 {
-    return detail::describe_run(run.outcome, run.reason, run.armed_beyond);
+    return detail::describe_run(run.outcome, run.reason, run.armed_beyond, run.armed_on_surface);
 }
 
 // A saved run: everything that its future depends on, as numbers, and the identity of the run.

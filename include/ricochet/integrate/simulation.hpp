@@ -80,7 +80,7 @@ class PartsOfRun {
     {
 #if RICOCHET_INLINES_FLOWS
         using D = DetectorTableOf<Detector, System, X>;
-        constexpr Screening screening = screening_of<Detector>;
+        constexpr detail::Screening screening = detail::screening_of<Detector>;
         if constexpr (NameOf<Method>::known && fits_registers<X>) {
             using Kernel = KernelOf<System, X, Method>;
             if constexpr (!Guarded<System, X>) {
@@ -88,16 +88,16 @@ class PartsOfRun {
             } else if constexpr (fixed_guard_count<System, X>() == 1 && GuardAlone<System, X> &&
                                  !GuardsTogether<System, X> && !RatesTogether<System, X> &&
                                  !D::predicts && !defers_checks<Detector, System, X>()) {
-                if constexpr (screening == Screening::extremum) {
+                if constexpr (screening == detail::Screening::extremum) {
                     return Kernel::template quiet<error_controlled, Extremum>();
-                } else if constexpr (screening == Screening::ends) {
+                } else if constexpr (screening == detail::Screening::ends) {
                     return Kernel::template quiet<error_controlled, Ends>();
                 }
             }
         } else if constexpr (by_series) {
             // Guards without a power series are sampled by the loop.
             constexpr bool proves =
-                screening == Screening::extremum || screening == Screening::every;
+                screening == detail::Screening::extremum || screening == detail::Screening::every;
             constexpr bool one = fixed_guard_count<System, X>() == 1 && !D::predicts &&
                                  !defers_checks<Detector, System, X>();
             if constexpr (!Guarded<System, X> ||
@@ -207,6 +207,7 @@ void update(Run<X>& to, const Run<CoreState<X>>& run, const X& like)
     to.other_guard = run.other_guard;
     to.reason = run.reason;
     to.armed_beyond = run.armed_beyond;
+    to.armed_on_surface = run.armed_on_surface;
     to.statistics = run.statistics;
     if (!run.phases.empty()) update_phases(to, run);
     if (to.events.empty()) to.events.reserve(run.events.size());
@@ -430,7 +431,10 @@ public:
     }
 
     /// Cost and savings of the network of a `Metered` detector so far.
-    [[nodiscard]] MeterReading meter() const requires Metering<Detector> { return loop_->meter(); }
+    [[nodiscard]] MeterReading meter() const requires detail::Metering<Detector>
+    {
+        return loop_->meter();
+    }
 
     /// Takes one step, with any events that it holds. False: the run has ended. A detector
     /// that defers checks does not look ahead here, since every step is final.
@@ -499,7 +503,8 @@ public:
     }
 
     /// Goes on from (t, x) in a mode, as from a start: guards are armed and the first step is
-    /// estimated again, and a time event at t belongs to the past. For interventions and
+    /// estimated again. An event of `Times` or `next_time_event(t)` at t belongs to the past; a
+    /// timer of `next_time_event(t, x)` that is due there has its event. For interventions and
     /// co-simulation: t may be any time from t_start to before t_end, also one that `advance` has
     /// stopped at inside a step; what was recorded after it is dropped. A run that has ended goes
     /// on, unless its result was taken.

@@ -477,7 +477,7 @@ requires(fixed_guard_count<System, X>() == 1) [[nodiscard]] TrainedClassifier
         out.model = std::move(trained.model);
         out.report = trained.report;
         if constexpr (requires { std::string_view(system.name); }) out.model.system = system.name;
-        out.model.recipe = name(Recipe::state);
+        out.model.recipe = name(ricochet::detail::Recipe::state);
         out.model.domain = surface.box();
         out.model.step_min = out.model.step_max = training.step;
         out.report.band = seen.band;

@@ -11,8 +11,8 @@ namespace ricochet {
 /// neighbouring doubles. Only the side of the guard is used, so any guard will do; its
 /// values are used only at the end, to tell a zero from a jump.
 struct Bisection {
-    [[nodiscard]] Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
-                                  double tolerance) const;
+    [[nodiscard]] detail::Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
+                                          double tolerance) const;
 };
 
 // Newton's method inside a bracket, with the slope from the flow: the default.
@@ -37,8 +37,8 @@ namespace detail {
 
 /// Locator by Newton's method inside a bracket, with the slope along the flow: the default.
 struct Newton {
-    [[nodiscard]] Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
-                                  double tolerance) const;
+    [[nodiscard]] detail::Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
+                                          double tolerance) const;
 };
 
 // TOMS 748 from Boost.Math, for guards whose slope is not available.
@@ -46,8 +46,8 @@ struct Newton {
 /// Inverse cubic interpolation on the values alone (Alefeld, Potra and Shi, ACM
 /// Transactions on Mathematical Software 21, 1995).
 struct Toms748 {
-    [[nodiscard]] Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
-                                  double tolerance) const;
+    [[nodiscard]] detail::Location locate(GuardPath& path, GuardSample lo, GuardSample hi,
+                                          double tolerance) const;
 };
 
 }  // namespace ricochet

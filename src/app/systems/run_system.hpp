@@ -27,8 +27,8 @@ namespace ricochet::app {
 struct ChosenLocator {
     LocatorKind kind;
 
-    [[nodiscard]] Location locate(GuardPath& path, const GuardSample& lo, const GuardSample& hi,
-                                  double tolerance) const
+    [[nodiscard]] detail::Location locate(GuardPath& path, const GuardSample& lo,
+                                          const GuardSample& hi, double tolerance) const
     {
         switch (kind) {
             case LocatorKind::newton: break;
@@ -122,6 +122,7 @@ template <class X>
                                  .other_guard = run.other_guard,
                                  .reason = run.reason,
                                  .armed_beyond = run.armed_beyond,
+                                 .armed_on_surface = run.armed_on_surface,
                                  .events = {},
                                  .trajectory = {.t = run.trajectory.t, .x = {}},
                                  .solution = {},

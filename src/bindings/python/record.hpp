@@ -48,7 +48,8 @@ struct Record {
     std::shared_ptr<Solution<State>> solution;  ///< null if it was not kept
     std::string wrong_bound;                    ///< sentence about a violated bound
     std::string reason;                         ///< text of the `Stop` that ended the run
-    std::vector<std::size_t> armed_beyond;      ///< guards that began beyond their surface
+    std::vector<std::size_t> armed_beyond;      ///< guards that began beyond their surface,
+    std::vector<std::size_t> armed_on_surface;  ///< and those of them that began on it
     std::vector<Phase> phases;                  ///< of a system with set-valued motion
     std::vector<double> reaction;
     std::size_t reaction_width = 0;  ///< number of reactions in the widest row
@@ -109,6 +110,7 @@ template <class X>
     out.statistics = run.statistics;
     out.reason = run.reason;
     out.armed_beyond = run.armed_beyond;
+    out.armed_on_surface = run.armed_on_surface;
     out.phases = run.phases;
     out.reaction = run.reaction;
     out.reaction_width = put_rows(steps ? steps->reactions : run.reactions, out.reactions);

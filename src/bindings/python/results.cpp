@@ -158,11 +158,12 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         bytes_of(r.times), bytes_of(r.states), r.wrong_bound,
         r.solution ? py::object(pickled(PySolution{r.solution})) : py::object(py::none()),
         self.modes, self.guard_names, r.reason, r.armed_beyond, pickled(r.phases),
-        bytes_of(r.reaction), bytes_of(r.reactions));
+        bytes_of(r.reaction), bytes_of(r.reactions), r.armed_on_surface);
 }
 
 [[nodiscard]] PyRun run_from(const py::tuple& state)
 {
+    if (state.size() != 22) throw py::value_error("found a pickle of another version");
     PyRun out;
     Record& r = out.record;
     r.outcome = static_cast<Outcome>(py::cast<int>(state[0]));
@@ -194,6 +195,7 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     }
     r.reaction = numbers_of(state[19]);
     r.reactions = numbers_of(state[20]);
+    r.armed_on_surface = py::cast<std::vector<std::size_t>>(state[21]);
     if (!r.times.empty()) r.reaction_width = r.reactions.size() / r.times.size();
     return out;
 }
@@ -318,7 +320,8 @@ void bind_results(py::module_& module)
         .def_property_readonly(
             "message",
             [](const PyRun& self) {
-                std::string out = detail::describe_run(self.record.outcome, self.record.reason, {});
+                std::string out =
+                    detail::describe_run(self.record.outcome, self.record.reason, {}, {});
                 const bool conflicts = self.record.outcome == Outcome::conflicting_resets;
                 if (conflicts) {
                     constexpr std::string_view in_cpp = "reset(fired, t, x)";
@@ -337,12 +340,21 @@ void bind_results(py::module_& module)
                     out += ": " + named(self.record.guard) + ", " + named(self.record.other_guard);
                 }
                 if (!self.record.wrong_bound.empty()) out += ": " + self.record.wrong_bound;
-                std::string_view before =
-                    "; began beyond their surface, and waited until they had "
-                    "returned (at_start and at_entry let them fire there): ";
-                for (const std::size_t which : self.record.armed_beyond) {
-                    out += std::string(std::exchange(before, ", ")) + self.guard_names.at(which);
-                }
+                const std::vector<std::size_t>& on = self.record.armed_on_surface;
+                const auto add = [&](bool on_surface, std::string_view before) {
+                    for (const std::size_t which : self.record.armed_beyond) {
+                        if (std::binary_search(on.begin(), on.end(), which) != on_surface) continue;
+                        out +=
+                            std::string(std::exchange(before, ", ")) + self.guard_names.at(which);
+                    }
+                };
+                add(false,
+                    "; began beyond their surface, and waited until they had returned (at_start "
+                    "and at_entry let them fire there): ");
+                add(true,
+                    "; began on their surface and moved on beyond it, which is no event "
+                    "(continues holds again what was at rest, unilateral and at_start give them "
+                    "one): ");
                 const std::string more = describe(self.record.statistics, self.guard_names);
                 return more.empty() ? out : out + "; " + more;
             },
