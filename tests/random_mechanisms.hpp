@@ -9,6 +9,7 @@
 #include <random>
 #include <string>
 
+#include "exact_inclusions.hpp"
 #include "problems/rolling_ball.hpp"
 #include "random_inclusions.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"

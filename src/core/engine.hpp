@@ -231,8 +231,14 @@ protected:
     /// @param taken  as in `leave_from_start`
     void apply_without_guards(bool on_time, double taken = 0)
     {
-        bank_.take_bands();
+        begin_set();
         apply_at_start(on_time, taken);
+    }
+    /// Begins the first set of an instant.
+    void begin_set() noexcept
+    {
+        bank_.take_bands();
+        first_set_ = true;
     }
     /// The same for a further level of an instant, at which guards have the tolerances of its set.
     void apply_at_start(bool on_time, double taken = 0);
@@ -867,13 +873,15 @@ protected:
     /// changed the state or the flow, or the resets of other guards have, and guard i stood on its
     /// surface since the start or its last event.
     [[nodiscard]] bool is_set_in_motion(std::size_t i);
-    /// Whether guard i, which is only recorded, has had an event with the set that has been
-    /// located.
+    /// Whether guard i, which is only recorded, has had an event that would have belonged to the
+    /// current set if it had acted.
     [[nodiscard]] bool is_recorded_with_set(std::size_t i) const noexcept
     {
         const GuardRecord& record = std::as_const(bank_)[i];
+        if (record.acting) return false;
+        if (!first_set_) return !on_time_ && record.recorded_in + 1 == armings_;
         const double t = step_.time(0);
-        return located_ && !record.acting && std::fabs(t - record.last) <= resolution_.blur(t);
+        return std::fabs(t - record.last) <= resolution_.blur(t);
     }
     /// Whether guard i stands on its surface, and no side is known from which it came.
     [[nodiscard]] bool stands(std::size_t i) const noexcept
@@ -1071,6 +1079,8 @@ protected:
     bool left_known_ = false;
     bool leaves_phase_ = false;  ///< `search_` still holds x⁻, which resets have left
     bool located_ = false;       ///< the current set lies inside the step, not at its start
+    bool first_set_ = false;     ///< it is the first of its instant
+    std::uint64_t armings_ = 0;  ///< number of times that all guards have been armed
     bool on_time_ = false;       ///< the current set coincides with a time event
     Pending pending_ = Pending::nothing;
     std::size_t stuck_ = no_guard;

@@ -9,7 +9,7 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline void EventEngine<X, single>::cut_short()
 {
-    bank_.take_bands();
+    begin_set();
     ++run_.statistics.steps;
     count_refined();
     record_notes(search_.at());

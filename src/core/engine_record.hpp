@@ -253,6 +253,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::record_jump(std::size_t i, Side before)
 {
     const double t = step_.time(0);
+    bank_[i].recorded_in = armings_;
     count_event(i, t, before);
     record({.t = t,
             .guard = i,

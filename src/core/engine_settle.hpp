@@ -219,6 +219,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::arm_all()
 {
     double widest = 0;
+    ++armings_;
     bank_.forget_fired();
     for (const std::size_t i : search_.fired()) {
         bank_[i].fired = true;
@@ -242,6 +243,7 @@ inline void EventEngine<X, single>::arm_all()
             goes_on = arm_one(i, widest, opens);
         }
     });
+    first_set_ = false;
 }
 
 template <class X, bool single>

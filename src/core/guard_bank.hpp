@@ -405,7 +405,7 @@ public:
         {
             return sign_[i] == 0;
         };
-        const bool plateaus = any_of(on_plateau);
+        const bool plateaus = are_few() || any_of(on_plateau);
         hand_over(g1_, g0_);
         if (rules_.uses_rates) hand_over(rate1_, rate0_);
         if (!plateaus) return;
@@ -540,6 +540,7 @@ private:
     }
 
     using Guards::any_of;
+    using Guards::are_few;
     using Guards::as_screened_;
     using Guards::at_rest_;
     using Guards::backward_;
@@ -568,7 +569,8 @@ private:
     /// Exchanges the samples at the end of a step with those at its start.
     void hand_over(Doubles& from, Doubles& to) const noexcept
     {
-        if (size() > 4 && !rules_.defers) {
+        // Few numbers lie in the vectors, whose exchange takes longer than a copy.
+        if (size() > few_guards && !rules_.defers) {
             from.swap(to);
         } else {
             for (std::size_t i = 0; i < size(); ++i) to[i] = from[i];

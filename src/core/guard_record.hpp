@@ -36,8 +36,10 @@ public:
 
 /// One T for every guard, without an allocation if there are few. Most systems have one guard,
 /// and for them the loop is compiled with that number as a constant.
+inline constexpr std::size_t few_guards = 8;
 template <class T, bool single>
-using PerGuard = std::conditional_t<single, ForTheGuard<T>, boost::container::small_vector<T, 8>>;
+using PerGuard =
+    std::conditional_t<single, ForTheGuard<T>, boost::container::small_vector<T, few_guards>>;
 
 /// List with room for as many elements as there are guards.
 template <class T, bool single>
@@ -106,6 +108,8 @@ struct GuardRecord {
     Excursions excursions;
     std::uint64_t instant = 0;  ///< the last at which it fired at the start of a step
     std::uint32_t at_once = 0;  ///< how often it did so then
+    /// The arming of all guards by which its last event has been recorded.
+    std::uint64_t recorded_in = std::numeric_limits<std::uint64_t>::max();
     bool armed_beyond = false;  ///< where it was armed at the start, or by a mode
     bool armed_on = false;      ///< the last time on its surface, moving beyond
 };

@@ -578,7 +578,15 @@ private:
     // --- phases ---
 
     /// Lets the phases change after a step, or where the run would end.
-    [[gnu::noinline]] void review_phase(bool has_advanced);
+    [[gnu::noinline]] void review_phase(bool has_advanced)
+    {
+        const double t = step_.start().value;
+        const bool goes_on =
+            !ended_ && phases_->goes_on &&
+            phases_->goes_on(system_.door(), step_.mode(), t, step_.x0(), has_advanced);
+        if (!goes_on) change_phase(has_advanced);
+    }
+    void change_phase(bool has_advanced);
     /// Goes on from here in another phase: not a start, so that guards keep their sides.
     /// @param h  as in `PhaseVerdict`
     void continue_from(const X& x, Mode mode, double h);

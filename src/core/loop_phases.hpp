@@ -6,7 +6,7 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-void Loop<X, single>::review_phase(bool has_advanced)
+void Loop<X, single>::change_phase(bool has_advanced)
 {
     // A phase that ends at once may be followed by another one, which ends at once.
     constexpr int most = 8;

@@ -301,7 +301,7 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
         this->record_jump(i, bank_[i].side);
         return false;
     }
-    bank_.take_bands();
+    this->begin_set();
     bank_[i].band = std::fabs(bank_.g0(i));
     search_.fired().clear();
     search_.fired().push_back(i);

@@ -111,6 +111,10 @@ struct PhaseTable {
     /// Whether the last set has an event of its own for a guard of the system: not for one that
     /// stands for a reaction whose change is recorded under another guard.
     bool (*records)(Door, std::size_t guard) = nullptr;
+    /// Whether the phase goes on after a step, seen at a glance; else `review` decides. Null: it
+    /// always does.
+    /// @param has_advanced  as in `PhaseStep`
+    bool (*goes_on)(Door, Mode, double t, const X& x, bool has_advanced) = nullptr;
     /// The phase after a step. May move x onto a surface.
     PhaseVerdict (*review)(Door, const PhaseStep<X>&, X& x) = nullptr;
     /// The phase where the run would end. May move x onto a surface.

@@ -174,7 +174,11 @@ public:
         if (checked() && !waiting_ && !bands_) {
             if (are_few()) {
                 return with_screen([&](auto screen) __attribute__((always_inline)) {
-                    return any_of(in_doubt(screen, h));
+                    const auto doubt = in_doubt(screen, h);
+                    for (std::size_t i = 0; i < size(); ++i) {
+                        if (sign_[i] != 0 && doubt(i)) return true;
+                    }
+                    return false;
                 });
             }
             mark(h);

@@ -11,10 +11,6 @@ namespace ricochet::detail {
 namespace {
 
 constexpr double most_patience = 0x1p20;
-/// Events within a hundredth of a step that are no longer worth locating, and events in a row
-/// between which a y stays within its error: their times are then determined by rounding, and
-/// unlike those of an accumulation they need not become denser.
-constexpr double most_events = 200, most_flutters = 400;
 
 }  // namespace
 
@@ -52,21 +48,19 @@ void PhaseRules::choose_watched(ModeInclusion& of, const double* x0)
 
 void PhaseRules::flow(Kind kind, double t, const double* x, double* dxdt)
 {
-    if (is_explicit(kind)) {
-        inclusion().flow(branches_of(kind), t, x, dxdt);
-    } else if (is_implicit(kind)) {
+    if (is_implicit(kind)) {
         inclusion().selected_rate(t, x, dxdt);
     } else {
         std::fill_n(dxdt, size_, 0.0);
     }
 }
 
-double PhaseRules::fraction_of_held(Kind kind, double t0, const double* x0, double t1,
-                                    const double* x1)
+double PhaseRules::fraction_of_held(BranchPhases& inclusion, Mode b, double t0, const double* x0,
+                                    double t1, const double* x1)
 {
     // Below that length the motion has no smoothness that steps could follow.
     if (t1 - t0 <= 1e-9 * (options_.t_end - options_.t_start)) return 1;
-    const double fraction = inclusion().fraction_of_held(branches_of(kind), t0, x0, t1, x1);
+    const double fraction = inclusion.fraction_of_held(b, t0, x0, t1, x1);
     memory_.contradicts = fraction > 0 ? 0 : 1;
     return fraction > 0 ? fraction : 0.1;
 }
@@ -105,64 +99,43 @@ GuardInfo PhaseRules::guard_info(std::size_t which) const
     return info;
 }
 
-bool PhaseRules::enabled(std::size_t which, Kind kind) const
+bool PhaseRules::watches(std::size_t which, Kind kind) const
 {
-    if (!has_inclusion()) return false;
-    if (watches_own(which)) return kind == own && now_->watched[reaction_of(which)];
-    return is_explicit(kind) && inclusion().enabled(in_branches(which), branches_of(kind));
+    return has_inclusion() && kind == own && now_->watched[reaction_of(which)];
 }
 
-double PhaseRules::guard(std::size_t which, Kind kind, double t, const double* x) const
+double PhaseRules::guard(std::size_t which, double t, const double* x) const
 {
-    if (!has_inclusion()) return 1;
+    if (!has_inclusion() || !watches_own(which)) return 1;
     // -y, kind 1, does not depend on the branches.
-    if (watches_own(which)) return -inclusion().guard(in_branches(which) - 4, 0, t, x);
-    return is_explicit(kind) ? inclusion().guard(in_branches(which), branches_of(kind), t, x) : 1;
+    return -inclusion().guard(in_branches(which) - 4, 0, t, x);
 }
 
 void PhaseRules::guards(Kind kind, double t, const double* x, std::span<double> g) const
 {
-    constexpr std::size_t from = BranchPhases::guards_of_reaction;
-    const std::size_t stride = guards_of_reaction();
-    if (has_inclusion() && is_explicit(kind)) {
-        for (std::size_t i = from; i < g.size(); i += stride) g[i] = 1;
-        return inclusion().guards(branches_of(kind), t, x, g.data(), stride);
-    }
     std::fill(g.begin(), g.end(), 1.0);
-    if (has_inclusion() && kind == own) {
-        inclusion().observe(t, x, observed_.data());
-        for (std::size_t i = 0; i < count(); ++i) {
-            g[stride * i + from] = observed_[i];
-        }
-    }
+    if (!has_inclusion() || kind != own) return;
+    constexpr std::size_t from = BranchPhases::guards_of_reaction;
+    inclusion().observe(t, x, observed_.data());
+    for (std::size_t i = 0; i < count(); ++i) g[guards_of_reaction() * i + from] = observed_[i];
 }
 
-double PhaseRules::guard_rate(std::size_t which, Kind kind, double t, const double* x,
+double PhaseRules::guard_rate(std::size_t which, double t, const double* x,
                               const double* dxdt) const
 {
-    if (!has_inclusion()) return 0;
-    if (watches_own(which)) return -inclusion().guard_rate(in_branches(which) - 4, 0, t, x, dxdt);
-    return is_explicit(kind)
-               ? inclusion().guard_rate(in_branches(which), branches_of(kind), t, x, dxdt)
-               : 0;
+    if (!has_inclusion() || !watches_own(which)) return 0;
+    return -inclusion().guard_rate(in_branches(which) - 4, 0, t, x, dxdt);
 }
 
 void PhaseRules::guard_rates(Kind kind, double t, const double* x, const double* dxdt,
                              std::span<double> rates) const
 {
-    constexpr std::size_t from = BranchPhases::guards_of_reaction;
-    const std::size_t stride = guards_of_reaction();
-    if (has_inclusion() && is_explicit(kind)) {
-        for (std::size_t i = from; i < rates.size(); i += stride) rates[i] = 0;
-        return inclusion().guard_rates(branches_of(kind), t, x, dxdt, rates.data(), stride);
-    }
     std::fill(rates.begin(), rates.end(), 0.0);
-    if (has_inclusion() && kind == own) {
-        for (std::size_t i = 0; i < count(); ++i) {
-            if (!now_->watched[i]) continue;
-            const std::size_t which = stride * i + from;
-            rates[which] = guard_rate(which, kind, t, x, dxdt);
-        }
+    if (!has_inclusion() || kind != own) return;
+    constexpr std::size_t from = BranchPhases::guards_of_reaction;
+    for (std::size_t i = 0; i < count(); ++i) {
+        const std::size_t which = guards_of_reaction() * i + from;
+        if (now_->watched[i]) rates[which] = guard_rate(which, t, x, dxdt);
     }
 }
 
@@ -585,9 +558,8 @@ void PhaseRules::note_flutter(const Set& set, Kind next, const double* x)
         const std::size_t i = reaction_of(fired.which);
         double speed = std::numeric_limits<double>::infinity();
         if (kind_of_guard(fired.which) < 2 && is_explicit(next)) {
-            std::vector<double> rate(size_);
-            inclusion().flow(branches_of(next), set.t, x, rate.data());
-            speed = std::fabs(inclusion().rate_of(i, rate.data()));
+            inclusion().flow(branches_of(next), set.t, x, flow_.data());
+            speed = std::fabs(inclusion().rate_of(i, flow_.data()));
         }
         // The largest |y| is that of a parabola between two zeros.
         const bool flutters = speed * (set.t - memory_.fluttered_at) / 4 <= resolution(i, x);

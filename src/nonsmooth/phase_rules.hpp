@@ -107,18 +107,40 @@ public:
 
     // --- the motion ---
 
+    /// In implicit phases, and where nothing moves.
     void flow(Kind kind, double t, const double* x, double* dxdt);
-    [[nodiscard]] double fraction_of_held(Kind kind, double t0, const double* x0, double t1,
-                                          const double* x1);
+    /// See `BranchPhases::fraction_of_held`.
+    [[nodiscard]] double fraction_of_held(BranchPhases& inclusion, Mode b, double t0,
+                                          const double* x0, double t1, const double* x1);
 
+    /// The guard of `BranchPhases` that is guard `which` of the phases.
+    [[nodiscard]] std::size_t in_branches(std::size_t which) const noexcept
+    {
+        if (options_.alone) return which;
+        return BranchPhases::guards_of_reaction * reaction_of(which) + kind_of_guard(which);
+    }
+    /// Whether it watches own phases.
+    [[nodiscard]] bool watches_own(std::size_t which) const noexcept
+    {
+        return !options_.alone && kind_of_guard(which) == BranchPhases::guards_of_reaction;
+    }
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const;
-    [[nodiscard]] bool enabled(std::size_t which, Kind kind) const;
-    [[nodiscard]] double guard(std::size_t which, Kind kind, double t, const double* x) const;
+    /// Whether a guard that watches own phases is enabled.
+    [[nodiscard]] bool watches(std::size_t which, Kind kind) const;
+    // Those that do, and all guards outside explicit phases.
+    [[nodiscard]] double guard(std::size_t which, double t, const double* x) const;
     void guards(Kind kind, double t, const double* x, std::span<double> g) const;
-    [[nodiscard]] double guard_rate(std::size_t which, Kind kind, double t, const double* x,
+    [[nodiscard]] double guard_rate(std::size_t which, double t, const double* x,
                                     const double* dxdt) const;
     void guard_rates(Kind kind, double t, const double* x, const double* dxdt,
                      std::span<double> rates) const;
+    /// Sets the numbers of those that do.
+    void fill_watching(std::span<double> numbers, double to) const noexcept
+    {
+        if (options_.alone) return;
+        constexpr std::size_t from = BranchPhases::guards_of_reaction;
+        for (std::size_t i = from; i < numbers.size(); i += from + 1) numbers[i] = to;
+    }
 
     /// A place s [s] after the start of a step, where the state is x.
     struct Place {
@@ -178,6 +200,20 @@ public:
         double h_next;
         bool has_advanced;
     };
+    /// Whether the phase in branches b of an inclusion goes on, seen at a glance.
+    [[nodiscard]] bool goes_on(Kind kind, const BranchPhases& inclusion, Mode b, double t,
+                               const double* x, bool has_advanced)
+    {
+        const bool may_let_go = !options_.alone || options_.alone->until_released;
+        if (begins_ || is_approach(kind) || (may_let_go && !inclusion.holds(b))) return false;
+        if (memory_.contradicts != 0 || memory_.fluttering > most_flutters) return false;
+        if (memory_.events >= memory_.marked_events + most_events) return false;
+        if (stall_.is_due(steps_ + has_advanced)) return false;
+        if (!inclusion.keeps_sides(b, t, x, sides_.data())) return false;
+        kind_ = kind;
+        steps_ += has_advanced;
+        return true;
+    }
     [[nodiscard]] Verdict review(const Step& step, double* x);
 
     struct End {
@@ -210,6 +246,10 @@ public:
 
 private:
     static constexpr double never = std::numeric_limits<double>::lowest();
+    /// Events within a hundredth of a step that are no longer worth locating, and events in a row
+    /// between which a y stays within its error: their times are then determined by rounding, and
+    /// unlike those of an accumulation they need not become denser.
+    static constexpr double most_events = 200, most_flutters = 400;
     /// What the rules remember. Numbers, as snapshots are.
     struct Memory {
         double set_valued = 0;         ///< whether the phase that is listed last is
@@ -327,14 +367,6 @@ private:
     [[nodiscard]] std::size_t kind_of_guard(std::size_t which) const noexcept
     {
         return which % guards_of_reaction();
-    }
-    [[nodiscard]] std::size_t in_branches(std::size_t which) const noexcept
-    {
-        return BranchPhases::guards_of_reaction * reaction_of(which) + kind_of_guard(which);
-    }
-    [[nodiscard]] bool watches_own(std::size_t which) const noexcept
-    {
-        return kind_of_guard(which) == BranchPhases::guards_of_reaction;
     }
 
     const BranchPhases& any_;

@@ -48,6 +48,7 @@ public:
           by_mode_(setup.by_mode),
           start_mode_(setup.start_mode),
           change_(setup.change),
+          method_(setup.method),
           inclusions_(std::move(setup.inclusions)),
           rules_(some_inclusion(), by_mode_, options),
           reactions_(some_inclusion().reactions()),
@@ -64,7 +65,7 @@ public:
         refuse_other_size(x0.size());
         make_modes(x0);
         find_asked_reactions();
-        make_kernels(setup.method, x0.size());
+        make_kernels(x0.size());
         make_table();
         make_phases();
     }
@@ -119,6 +120,25 @@ private:
         return rules_.in(is_active(mode) ? modes_[0] : none_);
     }
     [[nodiscard]] const ModeInclusion& inclusion_of(Mode mode) const { return in(mode).now(); }
+
+    /// What an explicit phase follows.
+    struct InBranches {
+        Mode mode = std::numeric_limits<Mode>::max();
+        BranchPhases* inclusion = nullptr;  ///< null in other phases
+        Mode branches = 0;
+    };
+    [[nodiscard]] const InBranches& in_branches(Mode mode) const
+    {
+        if (mode != in_branches_.mode) find_branches(mode);
+        return in_branches_;
+    }
+    [[gnu::noinline]] void find_branches(Mode mode) const
+    {
+        const Kind kind = kind_of(mode);
+        const bool is_explicit = rules_.is_explicit(kind);
+        in_branches_ = {mode, is_explicit ? inclusion_of(own_mode(mode)).inclusion : nullptr,
+                        rules_.branches_of(kind)};
+    }
     /// Whether some guard with a reaction is enabled in a mode, or no guard has one.
     [[nodiscard]] bool is_active(Mode mode) const;
 
@@ -128,7 +148,7 @@ private:
     void find_asked_reactions();
     void refuse_partly_active() const;
     void find_reactions_of_guards(ModeInclusion& of, const C& x0);
-    void make_kernels(MethodName method, std::size_t size);
+    void make_kernels(std::size_t size);
     void make_table();
     void add_guards();
     void add_resets();
@@ -153,13 +173,28 @@ private:
     }
     void guards(Mode mode, double t, const C& x, std::span<double> g) const
     {
-        if (guards_ > 0) own_.guards(user_.door, own_mode(mode), t, x, g.first(guards_));
-        in(own_mode(mode)).guards(kind_of(mode), t, x.data(), g.subspan(guards_));
+        if (guards_ > 0) {
+            own_.guards(user_.door, own_mode(mode), t, x, g.first(guards_));
+            g = g.subspan(guards_);
+        }
+        guards_of_phases(mode, t, x.data(), g);
+    }
+    void guards_of_phases(Mode mode, double t, const double* x, std::span<double> g) const
+    {
+        const InBranches& by = in_branches(mode);
+        if (!by.inclusion) return in(own_mode(mode)).guards(kind_of(mode), t, x, g);
+        rules_.fill_watching(g, 1);
+        by.inclusion->guards(by.branches, t, x, g.data(), rules_.guards_of_reaction());
     }
     [[nodiscard]] double guard(std::size_t i, Mode mode, double t, const C& x) const
     {
         if (i < guards_) return own_.guard(user_.door, i, own_mode(mode), t, x);
-        return in(own_mode(mode)).guard(i - guards_, kind_of(mode), t, x.data());
+        const std::size_t which = i - guards_;
+        const InBranches& by = in_branches(mode);
+        if (!by.inclusion || rules_.watches_own(which)) {
+            return in(own_mode(mode)).guard(which, t, x.data());
+        }
+        return by.inclusion->guard(rules_.in_branches(which), by.branches, t, x.data());
     }
     [[nodiscard]] double rate(GuardInMode of, ScaledTime time, const C& x, const C& dxdt) const
     {
@@ -167,22 +202,37 @@ private:
         if (of.which < guards_) {
             return own_.rate(user_.door, {of.which, mode, of.backward}, time, x, dxdt);
         }
-        return in(mode).guard_rate(of.which - guards_, kind_of(of.mode), time.t, x.data(),
-                                   dxdt.data());
+        const std::size_t which = of.which - guards_;
+        const InBranches& by = in_branches(of.mode);
+        if (!by.inclusion || rules_.watches_own(which)) {
+            return in(mode).guard_rate(which, time.t, x.data(), dxdt.data());
+        }
+        return by.inclusion->guard_rate(rules_.in_branches(which), by.branches, time.t, x.data(),
+                                        dxdt.data());
     }
     void rates(const Along<C>& motion, std::span<double> rates) const
     {
         const Mode mode = own_mode(motion.mode);
-        const Along<C> own{mode, motion.t, motion.x, motion.s};
         if (own_.rates) {
-            own_.rates(user_.door, own, rates.first(guards_));
+            own_.rates(user_.door, {mode, motion.t, motion.x, motion.s}, rates.first(guards_));
         } else {
             for (std::size_t i = 0; i < guards_; ++i) {
                 rates[i] = own_.rate(user_.door, {i, mode}, {motion.t, 0}, motion.x, motion.s);
             }
         }
-        in(mode).guard_rates(kind_of(motion.mode), motion.t, motion.x.data(), motion.s.data(),
-                             rates.subspan(guards_));
+        rates_of_phases(motion, rates.subspan(guards_));
+    }
+    void rates_of_phases(const Along<C>& motion, std::span<double> rates) const
+    {
+        const double *const x = motion.x.data(), *const dxdt = motion.s.data();
+        const InBranches& by = in_branches(motion.mode);
+        if (!by.inclusion) {
+            return in(own_mode(motion.mode))
+                .guard_rates(kind_of(motion.mode), motion.t, x, dxdt, rates);
+        }
+        rules_.fill_watching(rates, 0);
+        by.inclusion->guard_rates(by.branches, motion.t, x, dxdt, rates.data(),
+                                  rules_.guards_of_reaction());
     }
     /// The reaction whose y a guard of the user's is, in a mode of the user's.
     [[nodiscard]] std::size_t stands_for(std::size_t i, Mode mode) const
@@ -200,7 +250,12 @@ private:
     [[nodiscard]] bool enabled(std::size_t i, Mode mode) const
     {
         const Kind kind = kind_of(mode);
-        if (i >= guards_) return in(own_mode(mode)).enabled(i - guards_, kind);
+        if (i >= guards_) {
+            const std::size_t which = i - guards_;
+            if (rules_.watches_own(which)) return in(own_mode(mode)).watches(which, kind);
+            const InBranches& by = in_branches(mode);
+            return by.inclusion && by.inclusion->enabled(rules_.in_branches(which), by.branches);
+        }
         if (!rules_.has_own_guards(kind) && stands_for(i, own_mode(mode)) != no_reaction) {
             return false;
         }
@@ -256,20 +311,29 @@ private:
         const Kind kind = kind_of(mode);
         if (kind == PhaseRules::own) return {&own_kernel_, user_.door, own_.flow};
         if (rules_.is_implicit(kind)) return {&implicit_, this, table_.flow};
-        const bool holds = in(own_mode(mode)).holds(kind);
-        if (!rules_.is_explicit(kind)) return {free_, this, table_.flow};
-        explicit_ = {&*rules_.now().inclusion, rules_.branches_of(kind)};
-        return {holds ? &held_ : free_, this, [](void* door, Mode, double t, const C& x, C& dxdt) {
-                    const InBranches& here = at(door).explicit_;
-                    here.inclusion->flow(here.branches, t, x.data(), dxdt.data());
-                    return true;
-                }};
+        const InBranches& by = in_branches(mode);
+        if (!by.inclusion) return {free_, this, table_.flow};
+        explicit_ = explicit_stepper(by);
+        const bool holds = by.inclusion->holds(by.branches);
+        return holds ? Stepper<C>{&held_, this, table_.flow} : explicit_;
+    }
+    [[nodiscard]] Stepper<C> explicit_stepper(const InBranches& by)
+    {
+        if constexpr (std::is_same_v<C, SmallState>) {
+            const BranchStepper steps = by.inclusion->stepper(method_, by.branches);
+            if (steps.kernel) return {steps.kernel, steps.door};
+        }
+        return {free_, this, table_.flow};
     }
     bool flow(Mode mode, double t, const C& x, C& dxdt)
     {
         const Kind kind = kind_of(mode);
         if (kind == PhaseRules::own) return own_.flow(user_.door, own_mode(mode), t, x, dxdt);
-        in(own_mode(mode)).flow(kind, t, x.data(), dxdt.data());
+        if (const InBranches& by = in_branches(mode); by.inclusion) {
+            by.inclusion->flow(by.branches, t, x.data(), dxdt.data());
+        } else {
+            in(own_mode(mode)).flow(kind, t, x.data(), dxdt.data());
+        }
         return true;
     }
     [[nodiscard]] Mode decide(const PhaseSet<C>& set, C& after);
@@ -359,19 +423,15 @@ private:
     /// The error of a step that the held reactions do not follow asks for a shorter one.
     [[nodiscard]] double attempt_held(StepState<C>& step, double h, double rtol, double atol)
     {
-        const double error = free_->attempt(this, step, h, rtol, atol);
+        const double error = explicit_.kernel->attempt(explicit_.door, step, h, rtol, atol);
         if (!(error <= 1)) return error;
-        const double fraction = in(own_mode(step.mode))
-                                    .fraction_of_held(kind_of(step.mode), step.start.value,
-                                                      step.x0.data(), step.time(h), step.x1.data());
+        const InBranches& by = in_branches(step.mode);
+        const double fraction =
+            rules_.fraction_of_held(*by.inclusion, by.branches, step.start.value, step.x0.data(),
+                                    step.time(h), step.x1.data());
         if (fraction == 1) return error;
         return std::max(error, std::pow(0.9 / fraction, free_->error_order + 1));
     }
-
-    struct InBranches {
-        const BranchPhases* inclusion = nullptr;
-        Mode branches = 0;
-    };
 
     RunSetup<C> user_;
     const SystemTable<C>& own_;
@@ -379,6 +439,7 @@ private:
     bool by_mode_;  ///< one inclusion for each mode, else the first in all modes
     Mode (*start_mode_)(void* door, Mode mode, double t, const C& x);
     Mode (*change_)(void* door, std::size_t reaction, EventKind kind, Mode mode, double t, C& x);
+    MethodName method_;  ///< of explicit phases
     std::vector<Owner<BranchPhases>> inclusions_;
     std::vector<ModeInclusion> modes_;
     const ModeInclusion none_;
@@ -393,7 +454,8 @@ private:
     std::vector<std::size_t> own_fired_;
     std::vector<PhaseRules::Fired> fired_;
     std::vector<ReactionChange> changes_;
-    InBranches explicit_;  ///< of the steps, in an explicit phase
+    mutable InBranches in_branches_;  ///< in the mode that was asked for last
+    Stepper<C> explicit_;             ///< in an explicit phase, without a look at what is held
     const StepKernel<C>* free_ = nullptr;
     StepKernel<C> held_, implicit_;
     SystemTable<C> table_;
@@ -603,13 +665,21 @@ Mode PhasedSystem<C>::after_changes(Mode decided, double t, C& x)
 }
 
 template <class C>
-void PhasedSystem<C>::make_kernels(MethodName method, std::size_t size)
+void PhasedSystem<C>::make_kernels(std::size_t size)
 {
     // Power series are those of the user's guards alone.
     own_kernel_.guard_series = nullptr;
     own_kernel_.cross = nullptr;
-    free_ = &kernel_by_name<C>(method, size);
+    free_ = &kernel_by_name<C>(method_, size);
     held_ = *free_;
+    held_.take = [](void* door, StepState<C>& step, double h) {
+        const Stepper<C>& by = at(door).explicit_;
+        return by.kernel->take(by.door, step, h);
+    };
+    held_.depart = [](void* door, StepState<C>& step, double s, C& w, C& rate) {
+        const Stepper<C>& by = at(door).explicit_;
+        by.kernel->depart(by.door, step, s, w, rate);
+    };
     held_.attempt = [](void* door, StepState<C>& step, double h, double rtol, double atol) {
         return at(door).attempt_held(step, h, rtol, atol);
     };
@@ -661,6 +731,11 @@ void PhasedSystem<C>::add_guards()
     t.guards = [](void* door, Mode mode, double time, const C& x, std::span<double> g) {
         at(door).guards(mode, time, x, g);
     };
+    if (guards_ == 0) {
+        t.guards = [](void* door, Mode mode, double time, const C& x, std::span<double> g) {
+            at(door).guards_of_phases(mode, time, x.data(), g);
+        };
+    }
     t.guard = [](void* door, std::size_t i, Mode mode, double time, const C& x) {
         return at(door).guard(i, mode, time, x);
     };
@@ -672,6 +747,11 @@ void PhasedSystem<C>::add_guards()
     if (t.rated) {
         t.rates = [](void* door, const Along<C>& motion, std::span<double> rates) {
             at(door).rates(motion, rates);
+        };
+    }
+    if (guards_ == 0) {
+        t.rates = [](void* door, const Along<C>& motion, std::span<double> rates) {
+            at(door).rates_of_phases(motion, rates);
         };
     }
     t.enabled_in = [](void* door, std::size_t i, Mode mode) { return at(door).enabled(i, mode); };
@@ -746,6 +826,14 @@ void PhasedSystem<C>::make_phases()
     t.records = [](void* door, std::size_t i) {
         const PhasedSystem& me = at(door);
         return i < me.guards_ && me.rules_.records(me.stands_for(i, me.mode_), i);
+    };
+    t.goes_on = [](void* door, Mode mode, double time, const C& x, bool has_advanced) {
+        PhasedSystem& me = at(door);
+        const InBranches& by = me.in_branches(mode);
+        if (!by.inclusion) return false;
+        me.mode_ = own_mode(mode);
+        return me.rules_.goes_on(kind_of(mode), *by.inclusion, by.branches, time, x.data(),
+                                 has_advanced);
     };
     t.review = [](void* door, const PhaseStep<C>& step, C& x) {
         PhasedSystem& me = at(door);

@@ -21,6 +21,7 @@
 
 namespace ricochet::test {
 
+using detail::has_left;
 using detail::opposite;
 using detail::Screening;
 using detail::side_of;

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -196,6 +197,41 @@ TEST(GuardLife, AModeThatBeginsOnItsSurfaceWhileItCrossesFiresIt)
             .lines = {{0, 0.5, {.crossing = Crossing::rising}, to_1}, {1, 0, {}, end_in_2, 2}}};
         EXPECT_EQ(events_of(run_of(lines, {0, 1})),
                   rate < 0 ? Events({{0, 0.5}, {1, 0.5}}) : Events({{0, 0.5}}));
+    }
+}
+
+TEST(GuardLife, ARecordedOneHasTheEventsOfOneThatActs)
+{
+    const auto events = [](Lines lines, const Lines::State& x0, GuardInfo info) {
+        info.resets = false;
+        std::array<Events, 2> found;
+        for (const std::uint32_t stop_after : {0U, 100U}) {
+            info.stop_after = stop_after;
+            lines.lines.back().info = info;
+            found[stop_after > 0] = events_of(run_of(lines, x0));
+            std::sort(found[stop_after > 0].begin(), found[stop_after > 0].end());
+        }
+        EXPECT_EQ(found[0], found[1]);
+        return std::count_if(found[0].begin(), found[0].end(), [&](const auto& event) {
+            return event.first + 1 == lines.lines.size();
+        });
+    };
+    const auto to_1 = [](Mode, Lines::State&) -> Mode { return 1; };
+    const Lines::Line clock{0, 0.5, {.crossing = Crossing::rising}, to_1};
+    // Its mode begins on its surface, while it crosses.
+    EXPECT_EQ(events({{{{1, -1}, {1, -1}}}, {clock, {1, 0, {}, {}, 2}}}, {0, 0.5}, {}), 1);
+    // Its mode begins while it stands there, and is carried across later.
+    const auto down = [](Mode mode, Lines::State& x) {
+        x[1] = -1;
+        return mode;
+    };
+    const Lines::Line later{0, 1, {.crossing = Crossing::rising}, down};
+    EXPECT_EQ(events({{{{1, 0}, {1, 0}}}, {clock, later, {1, 0, {}, {}, 2}}}, {0, 0}, {}), 1);
+    // Another guard turns the motion back on the surface.
+    const Lines::Line floor{1, 0, {}, to_1};
+    for (const Crossing crossing : {Crossing::falling, Crossing::rising, Crossing::either}) {
+        EXPECT_EQ(events({{{{1, -1}, {1, 1}}}, {floor, {1, 0}}}, {0, 0.5}, {.crossing = crossing}),
+                  1);
     }
 }
 

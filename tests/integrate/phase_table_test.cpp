@@ -56,7 +56,18 @@ public:
         return out;
     }
 
-    int ticks = 0;  ///< resets of time events so far
+    /// Lets rising phases go on at a glance.
+    void glance()
+    {
+        phases_.goes_on = [](void* door, Mode mode, double, const C&, bool) {
+            at(door).looks += falls(mode);
+            return !falls(mode);
+        };
+    }
+
+    int ticks = 0;    ///< resets of time events so far
+    int looks = 0;    ///< times that a glance was not enough
+    int reviews = 0;  ///< calls of `review`
 
 private:
     [[nodiscard]] static Sawtooth& at(void* door) { return *static_cast<Sawtooth*>(door); }
@@ -119,7 +130,10 @@ private:
             return std::span<const ReactionChange>(at(door).changes_);
         };
         phases_.records = [](void*, std::size_t) { return true; };
-        phases_.review = [](void*, const PhaseStep<C>&, C&) { return PhaseVerdict{}; };
+        phases_.review = [](void* door, const PhaseStep<C>&, C&) {
+            ++at(door).reviews;
+            return PhaseVerdict{};
+        };
         phases_.give_up = [](void*, const PhaseEnd<C>&, C&) { return PhaseVerdict{}; };
         phases_.save = [](void*, std::vector<double>& memory) { memory.clear(); };
         phases_.restore = [](void*, const std::vector<double>&) {};
@@ -168,6 +182,19 @@ TEST(PhaseTable, StepsAreTakenByTheStepperOfThePhase)
     EXPECT_NEAR(run.x[0], 0.75, exact);
     EXPECT_EQ(run.mode, 0U);
     expect_turns(run.events);
+}
+
+TEST(PhaseTable, APhaseThatGoesOnAtAGlanceIsNotReviewed)
+{
+    Sawtooth each, glanced;
+    glanced.glance();
+    const auto run = make_loop(each.setup(), zero(), until(3))->take();
+    const auto same = make_loop(glanced.setup(), zero(), until(3))->take();
+    EXPECT_EQ(glanced.reviews, glanced.looks);
+    EXPECT_GT(glanced.reviews, 0);
+    EXPECT_LT(glanced.reviews, each.reviews);
+    EXPECT_EQ(same.x, run.x);
+    expect_turns(same.events);
 }
 
 TEST(PhaseTable, ATimeEventAtALocatedChangeIsAMemberOfItsSet)

@@ -177,6 +177,36 @@ TEST(Lists, EachEntryIsALevelThatGuardsMayAnswer)
     EXPECT_NEAR(run.x[0], 0.5, 1e-15);
 }
 
+TEST(Lists, ACrossingAtATimeThatIsListedTwiceIsOneEvent)
+{
+    // x' = 1 or -1 through zero at 0.1 k, which rounding moves by some 1e-17: the second entry
+    // takes the guard to be as near to its surface as the first has found it.
+    struct Line {
+        using State = std::array<double, 1>;
+        double rate;
+        GuardInfo info;
+        Times time_events;
+        void flow(double, const State&, State& dxdt) const { dxdt = {rate}; }
+        [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
+        [[nodiscard]] GuardInfo guard_info() const { return info; }
+    };
+    for (const Crossing crossing : {Crossing::falling, Crossing::rising, Crossing::either}) {
+        for (const std::uint32_t stop_after : {0U, 100U}) {
+            for (const double rate : {-1.0, 1.0}) {
+                const bool counts =
+                    crossing == Crossing::either || (crossing == Crossing::falling) == (rate < 0);
+                for (int k = 1; k <= 100; ++k) {
+                    const double t = 0.1 * k;
+                    const Line line{
+                        rate, {.crossing = crossing, .stop_after = stop_after}, {t, t, t}};
+                    const auto run = integrate(line, {-rate * t}, {.t_end = t + 1});
+                    EXPECT_EQ(run.statistics.events, 3U + counts) << t << ' ' << rate;
+                }
+            }
+        }
+    }
+}
+
 TEST(Lists, AGuardInTheStepsOfAHostMayAnswerAnyNumberOfTicks)
 {
     // The thousandth event of a guard at one instant ends a run, not the thousandth of its answers.

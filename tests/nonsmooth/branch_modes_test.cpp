@@ -184,7 +184,7 @@ double fraction_of(const Modes& modes, detail::HeldReactions<1, 1>& reactions, d
     Modes::Motion motion;
     Modes::Rooms rooms;
     modes.rooms(held, t1, w, motion, rooms);
-    return reactions.fraction(modes, {held, t0, t1, w, w, 0}, motion, rooms);
+    return reactions.fraction(modes, {held, t0, t1, w, w, 0}, motion.rate, rooms);
 }
 double fraction_of(const Block& block, double t0, double t1)
 {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <random>
 
+#include "exact_inclusions.hpp"
 #include "problems/super_twisting.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"

@@ -71,8 +71,7 @@ struct RICOCHET_ALIGNED InclusionTable {
     using Action =
         Eigen::Matrix<double, N, M, N == 1 && M != 1 ? Eigen::RowMajor : Eigen::ColMajor>;
     using Terms = BranchTerms<N, M>;
-    using Flow =
-        BranchFlow<Terms, std::make_index_sequence<static_cast<std::size_t>(N > 0 ? N : 0)>>;
+    using Flow = BranchFlow<N>;
     using StepInputs = std::array<double, StepView::state_inputs>;
 
     InclusionTraits traits;
@@ -102,8 +101,10 @@ struct RICOCHET_ALIGNED InclusionTable {
     // every held y that is a component is at rest to the last bit.
     typename Flow::Function flow = nullptr;
     typename Flow::Function flow_of_diagonal = nullptr;  ///< for a diagonal A
-    void (*branch_state)(System, const Terms& terms, Mode mode, double t, const State& w,
-                         MotionInBranches<N, M>& out) = nullptr;
+    using BranchState = void (*)(System, const Terms& terms, Mode mode, double t, const State& w,
+                                 MotionInBranches<N, M>& out);
+    BranchState branch_state = nullptr;
+    BranchState branch_state_of_diagonal = nullptr;
 
     const StepLayout& (*step_layout)() = nullptr;
     double (*step_unit)(System) = nullptr;
@@ -243,10 +244,9 @@ public:
     {
         return diagonal ? table_->flow_of_diagonal : table_->flow;
     }
-    void branch_state(const Terms& terms, Mode mode, double t, const State& w,
-                      BranchMotion& out) const
+    [[nodiscard]] typename Table::BranchState branch_state(bool diagonal) const noexcept
     {
-        table_->branch_state(system(), terms, mode, t, w, out);
+        return diagonal ? table_->branch_state_of_diagonal : table_->branch_state;
     }
 
     /// The layout of the system's inputs for policies; null if it has none.

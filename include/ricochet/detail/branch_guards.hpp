@@ -13,7 +13,8 @@
 namespace ricochet::detail {
 
 template <int N, int M>
-void AnyModes<N, M>::rooms(Mode mode, double t, const Vector& w, Motion& motion, Rooms& rooms) const
+[[gnu::always_inline]] inline void AnyModes<N, M>::rooms(Mode mode, double t, const Vector& w,
+                                                         Motion& motion, Rooms& rooms) const
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
     find_motion(mode, t, w, motion);
@@ -29,10 +30,9 @@ void AnyModes<N, M>::rooms(Mode mode, double t, const Vector& w, Motion& motion,
 }
 
 template <int N, int M>
-double AnyModes<N, M>::guard(std::size_t which, Mode mode, double t, const State& x) const
+double AnyModes<N, M>::guard(std::size_t which, Mode mode, double t, const Vector& w) const
 {
     const auto i = static_cast<Eigen::Index>(which / 4);
-    const Vector w = vector(x);
     if (which >= first_set_guard) {
         Reaction lower, upper;
         matrices_.inclusion().bounds(t, w, lower, upper);
@@ -47,11 +47,13 @@ double AnyModes<N, M>::guard(std::size_t which, Mode mode, double t, const State
 }
 
 template <int N, int M>
-void AnyModes<N, M>::guards(Mode mode, double t, const State& x, std::span<double> g) const
+void AnyModes<N, M>::guards(Mode mode, double t, const Vector& w, const Motion* known,
+                            std::span<double> g) const
 {
-    const Vector w = vector(x);
     const Reaction y = observed(t, w);
-    const Motion here = bounded_motion(mode < branch_modes ? mode : 0, t, w);
+    Motion room;
+    if (!known) find_bounded_motion(mode < branch_modes ? mode : 0, t, w, room);
+    const Motion& here = known ? *known : room;
     Reaction lower = here.lower, upper = here.upper;
     if (matrices_.traits().continues_bounds) matrices_.inclusion().bounds(t, w, lower, upper);
     if (count() < M) std::fill(g.begin(), g.end(), 1.0);
@@ -67,30 +69,30 @@ void AnyModes<N, M>::guards(Mode mode, double t, const State& x, std::span<doubl
 }
 
 template <int N, int M>
-double AnyModes<N, M>::guard_rate(std::size_t which, Mode mode, double t, const State& x,
-                                  const State& dxdt) const
+double AnyModes<N, M>::guard_rate(std::size_t which, Mode mode, double t, const Vector& w,
+                                  const Vector& dwdt) const
 {
     if (which >= first_set_guard) return 0;
     const auto i = static_cast<Eigen::Index>(which / 4);
-    const Vector w = vector(x);
-    const Vector dwdt = vector(dxdt);
-    if (which % 4 >= 2) return slack_rates(i, mode, t, w, dwdt)[which % 4 - 2];
+    if (which % 4 >= 2) {
+        return slack_rates(i, mode, t, w, dwdt, motion(mode, t, w))[which % 4 - 2];
+    }
     const double rate = observed_rate(i, mode, t, w, dwdt);
     return which % 4 == 0 ? rate : -rate;
 }
 
 template <int N, int M>
-void AnyModes<N, M>::guard_rates(Mode mode, double t, const State& x, const State& dxdt,
-                                 std::span<double> rates) const
+void AnyModes<N, M>::guard_rates(Mode mode, double t, const Vector& w, const Vector& dwdt,
+                                 const Motion* known, std::span<double> rates) const
 {
     std::fill(rates.begin(), rates.end(), 0.0);
     if (mode >= branch_modes) return;
-    const Vector w = vector(x);
-    const Vector dwdt = vector(dxdt);
+    Motion now;
+    if (!known && holds(mode)) find_motion(mode, t, w, now);
     for (Eigen::Index i = 0; i < count(); ++i) {
         const auto k = static_cast<std::size_t>(i);
         if (is_held(i, mode)) {
-            const Slacks of = slack_rates(i, mode, t, w, dwdt);
+            const Slacks of = slack_rates(i, mode, t, w, dwdt, known ? *known : now);
             rates[4 * k + 2] = of[0];
             rates[4 * k + 3] = of[1];
         } else {

@@ -147,7 +147,12 @@ public:
             for_each_component(dxdt, [&](auto i) { dxdt[i] = 0; });
             return;
         }
-        typename Inclusion::Flow{flow_, matrices_.inclusion().system(), terms_}(mode, t, x, dxdt);
+        flow_by_components()(mode, t, x, dxdt);
+    }
+    /// The flow of the modes of branches.
+    [[nodiscard]] BranchFlow<N> flow_by_components() const noexcept
+    {
+        return {flow_, matrices_.inclusion().system(), &terms_};
     }
 
     /// Reactions and rates in a mode at (t, w).
@@ -168,16 +173,36 @@ public:
                (terms_.holds[mask_of(mode)].largest * free + r.template lpNorm<Eigen::Infinity>());
     }
 
-    [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const;
+    [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
+    {
+        return guard(which, mode, t, vector(x));
+    }
+    [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const Vector& w) const;
 
     /// Evaluates all guards from one evaluation of the reactions.
-    void guards(Mode mode, double t, const State& x, std::span<double> g) const;
+    void guards(Mode mode, double t, const State& x, std::span<double> g) const
+    {
+        guards(mode, t, vector(x), nullptr, g);
+    }
+    /// @param known  the motion there, or null
+    void guards(Mode mode, double t, const Vector& w, const Motion* known,
+                std::span<double> g) const;
 
     [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const State& x,
-                                    const State& dxdt) const;
+                                    const State& dxdt) const
+    {
+        return guard_rate(which, mode, t, vector(x), vector(dxdt));
+    }
+    [[nodiscard]] double guard_rate(std::size_t which, Mode mode, double t, const Vector& w,
+                                    const Vector& dwdt) const;
 
     /// Rates of the guards that the mode enables; the others are 0.
     void guard_rates(Mode mode, double t, const State& x, const State& dxdt,
+                     std::span<double> rates) const
+    {
+        guard_rates(mode, t, vector(x), vector(dxdt), nullptr, rates);
+    }
+    void guard_rates(Mode mode, double t, const Vector& w, const Vector& dwdt, const Motion* known,
                      std::span<double> rates) const;
 
     /// Applies all transitions of one instant together.
@@ -320,7 +345,7 @@ private:
     }
     void find_motion(Mode mode, double t, const Vector& w, Motion& out) const
     {
-        matrices_.inclusion().branch_state(terms_, mode, t, w, out);
+        state_(matrices_.inclusion().system(), terms_, mode, t, w, out);
         if (!matrices_.traits().gives_static_bound) return;
         for (Eigen::Index i = 0; i < count(); ++i) {
             if (!is_held(i, mode)) continue;
@@ -368,16 +393,14 @@ private:
                 std::isinf(upper) ? std::copysign(1.0, upper) : upper - r};
     }
 
-    /// Same as `motion`, but without the rate in a mode that holds nothing, which needs none.
-    [[nodiscard]] Motion bounded_motion(Mode mode, double t, const Vector& w) const
+    /// Same as `find_motion`, but without the rate in a mode that holds nothing, which needs none.
+    void find_bounded_motion(Mode mode, double t, const Vector& w, Motion& out) const
     {
-        if (holds(mode)) return motion(mode, t, w);
-        Motion out;
+        if (holds(mode)) return find_motion(mode, t, w, out);
         matrices_.inclusion().branch_bounds(t, w, out.lower, out.upper);
         for (Eigen::Index i = 0; i < M; ++i, mode /= 3) {
             out.reaction[i] = mode % 3 == 0 ? out.lower[i] : out.upper[i];
         }
-        return out;
     }
 
     [[nodiscard]] Slacks slacks(Eigen::Index i, Mode mode, double t, const Vector& w) const
@@ -413,10 +436,10 @@ private:
         return std::abs(rate) <= 64 * std::numeric_limits<double>::epsilon() * size ? 0 : rate;
     }
 
+    /// @param now  the motion there
     [[nodiscard]] Slacks slack_rates(Eigen::Index i, Mode mode, double t, const Vector& w,
-                                     const Vector& dwdt) const
+                                     const Vector& dwdt, const Motion& now) const
     {
-        const Motion now = motion(mode, t, w);
         const double lower = now.lower[i];
         const double upper = now.upper[i];
         if (std::isinf(lower) && std::isinf(upper)) return {0, 0};
@@ -558,6 +581,7 @@ private:
     BranchTerms<N, M> terms_;
     bool is_unique_ = true;  ///< all principal minors of W are positive
     typename Inclusion::Flow::Function flow_ = nullptr;
+    typename Inclusion::Table::BranchState state_ = nullptr;
 };
 
 template <int N, int M>
@@ -568,6 +592,7 @@ AnyModes<N, M>::AnyModes(const AnyInclusion<N, M>& inclusion) : matrices_(inclus
     terms_.inverse_diagonal = terms_.inverse_mass.diagonal();
     terms_.diagonal = terms_.inverse_mass.isDiagonal(0);
     flow_ = inclusion.branch_flow(terms_.diagonal);
+    state_ = inclusion.branch_state(terms_.diagonal);
     terms_.lever = times(matrices_.inverse_mass(), matrices_.act());
     terms_.delassus = times(matrices_.observe(), terms_.lever);
     for (Eigen::Index i = 0; i < M; ++i) terms_.selected[i] = matrices_.selected(i);

@@ -17,9 +17,20 @@
 
 #include "ricochet/detail/composite_step.hpp"
 #include "ricochet/detail/owner.hpp"
+#include "ricochet/detail/small_state.hpp"
 #include "ricochet/hybrid/guard.hpp"
+#include "ricochet/integrate/methods.hpp"
 
 namespace ricochet::detail {
+
+template <class X>
+struct StepKernel;
+
+/// A kernel and the door of its functions.
+struct BranchStepper {
+    const StepKernel<SmallState>* kernel = nullptr;
+    void* door = nullptr;
+};
 
 struct BranchPhasesOptions {
     SchemeOptions scheme{};      ///< of implicit steps
@@ -83,6 +94,9 @@ public:
     virtual void observe(double t, const double* x, double* y) const = 0;
     /// y' = E x' - s'(t).
     virtual void observe_rate(double t, const double* dxdt, double* rates) const = 0;
+    /// Whether no y is beyond zero in branches b. Writes the signs of those that are not zero.
+    [[nodiscard]] virtual bool keeps_sides(Mode b, double t, const double* x,
+                                           double* sides) const = 0;
     /// The largest component that row i of E reads.
     [[nodiscard]] virtual double size_of_row(std::size_t i, const double* x) const = 0;
     /// Whether the motion is that of a flow wherever no y is zero: for boxes of reactions.
@@ -140,6 +154,9 @@ public:
     [[nodiscard]] virtual bool stays_held(Mode b, double t, const double* x) const = 0;
     [[nodiscard]] virtual bool flows(Mode b) const noexcept = 0;
     virtual void flow(Mode b, double t, const double* x, double* dxdt) const = 0;
+    /// Steps in branches b by a method that holds the state in registers, until the next call;
+    /// empty where the inclusion has none.
+    [[nodiscard]] virtual BranchStepper stepper(MethodName method, Mode b) noexcept = 0;
     /// The reactions in branches b; at the end of the last implicit step.
     virtual void reaction(Mode b, double t, const double* x, double* r) const = 0;
     virtual void reaction_of_step(double* r) const = 0;

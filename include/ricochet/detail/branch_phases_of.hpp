@@ -10,6 +10,7 @@
 #include <span>
 #include <vector>
 
+#include "ricochet/detail/branch_kernels.hpp"
 #include "ricochet/detail/branch_modes.hpp"
 #include "ricochet/detail/false_position.hpp"
 #include "ricochet/detail/held_reactions.hpp"
@@ -44,6 +45,16 @@ public:
     void observe(double t, const double* x, double* y) const override
     {
         write(modes_.observed(t, vector(x)), y, reactions());
+    }
+
+    [[nodiscard]] bool keeps_sides(Mode b, double t, const double* x, double* sides) const override
+    {
+        const Reaction y = modes_.observed(t, vector(x));
+        for (Eigen::Index i = 0; i < modes_.count(); ++i, b /= 3) {
+            if ((b % 3 == 0 && y[i] < 0) || (b % 3 == 2 && y[i] > 0)) return false;
+            if (y[i] != 0) sides[i] = std::copysign(1.0, y[i]);
+        }
+        return true;
     }
 
     // --- entering ---
@@ -112,24 +123,26 @@ public:
     }
     [[nodiscard]] double guard(std::size_t which, Mode b, double t, const double* x) const override
     {
-        return modes_.guard(of_modes(which), b, t, array(x));
+        return modes_.guard(of_modes(which), b, t, vector(x));
     }
     void guards(Mode b, double t, const double* x, double* g, std::size_t stride) const override
     {
         std::array<double, Modes::guard_count> all;
-        modes_.guards(b, t, array(x), all);
+        const Vector w = vector(x);
+        modes_.guards(b, t, w, known(b, t, w), all);
         spread(all, g, stride);
     }
     [[nodiscard]] double guard_rate(std::size_t which, Mode b, double t, const double* x,
                                     const double* dxdt) const override
     {
-        return modes_.guard_rate(of_modes(which), b, t, array(x), array(dxdt));
+        return modes_.guard_rate(of_modes(which), b, t, vector(x), vector(dxdt));
     }
     void guard_rates(Mode b, double t, const double* x, const double* dxdt, double* rates,
                      std::size_t stride) const override
     {
         std::array<double, Modes::guard_count> all;
-        modes_.guard_rates(b, t, array(x), array(dxdt), all);
+        const Vector w = vector(x);
+        modes_.guard_rates(b, t, w, vector(dxdt), known(b, t, w), all);
         spread(all, rates, stride);
     }
     [[nodiscard]] Mode reset(std::span<const std::size_t> fired, Mode b, double t,
@@ -156,6 +169,16 @@ public:
         modes_.flow(b, t, array(x), rate);
         Base::write_state(rate.data(), dxdt);
     }
+    [[nodiscard]] BranchStepper stepper(MethodName method, Mode b) noexcept override
+    {
+        if constexpr (has_branch_kernel<N>) {
+            if (size() != static_cast<std::size_t>(N)) return {};  // a state of another size
+            flow_.of = modes_.flow_by_components();
+            flow_.mode = b;
+            return {&branch_kernel<N>(method), &door_};
+        }
+        return {};
+    }
     void reaction(Mode b, double t, const double* x, double* r) const override
     {
         write(modes_.reaction(b, t, vector(x)), r, reactions());
@@ -168,9 +191,11 @@ public:
                                           const double* x1) override
     {
         const Vector w0 = vector(x0), w1 = vector(x1);
-        typename Modes::Motion motion;
+        known_.t = t1;
+        known_.branches = b;
+        known_.w = w1;
         typename Modes::Rooms rooms;
-        modes_.rooms(b, t1, w1, motion, rooms);
+        modes_.rooms(b, t1, w1, known_.motion, rooms);
         for (const double room : rooms) {
             if (room < 0) return exits(b, t0, w0, rooms) ? 1 : -1;
         }
@@ -181,7 +206,7 @@ public:
                                                 .w0 = w0,
                                                 .w1 = w1,
                                                 .event_tolerance = options_.event_tolerance},
-                                               motion, rooms);
+                                               known_.motion.rate, rooms);
         held_end_ = {t1, t1 - t0, b, w1};
         return held_.starts_beyond() ? -1 : fraction;
     }
@@ -353,6 +378,13 @@ private:
         }
     }
 
+    /// The motion in branches b at (t, w) where a held step has just ended, else null.
+    [[nodiscard]] const typename Modes::Motion* known(Mode b, double t, const Vector& w) const
+    {
+        const bool same = t == known_.t && b == known_.branches && w == known_.w;
+        return same ? &known_.motion : nullptr;
+    }
+
     [[nodiscard]] X array(const double* x) const
     {
         X out;
@@ -409,7 +441,18 @@ private:
         return branches_of(to_);
     }
 
+    /// The motion where it was asked for at the end of the last held step.
+    struct Known {
+        double t = std::numeric_limits<double>::quiet_NaN();
+        Mode branches = 0;
+        Vector w;
+        typename Modes::Motion motion;
+    };
+
     Modes modes_;
+    Known known_;
+    FlowInMode<N> flow_;
+    Door<FlowInMode<N>, X> door_{flow_, X{}};
     HeldReactions<N, M> held_;
     HeldEnd held_end_;
     Located located_;

@@ -73,32 +73,33 @@ __extension__ using FirstRates = __complex__ double;
 /// `more`. Every stage of a Runge-Kutta step depends on the flow of the stage before, and passing
 /// the state through memory lengthens this chain: with three components the run of the diode
 /// circuit takes 72 us through memory, and 59 us with components in registers.
-template <class Terms, class Components>
-struct BranchFlow;
+template <class Components>
+struct FlowByComponents;
 
-template <class Terms, std::size_t... I>
-struct BranchFlow<Terms, std::index_sequence<I...>> {
+template <std::size_t... I>
+struct FlowByComponents<std::index_sequence<I...>> {
     template <std::size_t>
     using Component = double;
-    using Function = FirstRates (*)(const void* system, const Terms& terms, Mode mode, double t,
+    using Function = FirstRates (*)(const void* system, const void* terms, Mode mode, double t,
                                     Component<I>... x, double* more);
 
-    template <class Typed, bool diagonal>
-    static FirstRates call(const void* system, const Terms& terms, Mode mode, double t,
+    template <class Typed, class Terms, bool diagonal>
+    static FirstRates call(const void* system, const void* terms, Mode mode, double t,
                            Component<I>... x, [[maybe_unused]] double* more)
     {
         Eigen::Matrix<double, sizeof...(I), 1> w, rate;
         ((w[I] = x), ...);
-        Typed::template flow<diagonal>(system, terms, mode, t, w, rate);
+        const auto& typed = *static_cast<const Terms*>(terms);
+        Typed::template flow<diagonal>(system, typed, mode, t, w, rate);
         ((I < 2 ? void() : void(more[I - 2] = rate[I])), ...);
         FirstRates two = rate[0];
         if constexpr (sizeof...(I) > 1) __imag__ two = rate[1];
         return two;
     }
 
-    Function function;
-    const void* system;
-    const Terms& terms;
+    Function function = nullptr;
+    const void* system = nullptr;
+    const void* terms = nullptr;  ///< `BranchTerms` of N components
 
     /// Calls the function at (t, x).
     template <class X>
@@ -109,5 +110,10 @@ struct BranchFlow<Terms, std::index_sequence<I...>> {
         ((rate[I] = I == 0 ? __real__ two : I == 1 ? __imag__ two : more[I < 2 ? 0 : I - 2]), ...);
     }
 };
+
+/// None for sizes that are not fixed, which have no modes.
+template <int N>
+using BranchFlow =
+    FlowByComponents<std::make_index_sequence<static_cast<std::size_t>(N > 0 ? N : 0)>>;
 
 }  // namespace ricochet::detail

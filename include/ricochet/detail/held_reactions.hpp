@@ -39,8 +39,8 @@ class RICOCHET_ALIGNED HeldReactions {
 
 public:
     /// The fraction of a step that would follow the reactions; 1 if the step does.
-    /// @param motion, rooms  at the end of the step
-    [[nodiscard]] double fraction(const Modes& modes, const Step& step, const Motion& motion,
+    /// @param rate, rooms  at the end of the step
+    [[nodiscard]] double fraction(const Modes& modes, const Step& step, const Vector& rate,
                                   const Rooms& rooms)
     {
         starts_beyond_ = false;
@@ -50,7 +50,7 @@ public:
         end_.mode = step.mode;
         if (!goes_on) evaluate(modes, step.t0, step.w0, h, end_);
         start_ = end_;
-        end_.motion = motion;
+        end_.rate = rate;
         end_.rooms = rooms;
         find_change(modes, step.t1, step.w1, -h, end_);
         // A step that is much longer than the one before could agree by accident.
@@ -68,9 +68,6 @@ public:
         length_ = h;
         return worst_ <= 1 ? 1 : std::clamp(0.8 / std::sqrt(std::sqrt(worst_)), 0.1, 0.5);
     }
-
-    /// Whether a step of twice the last one's length would have sufficed.
-    [[nodiscard]] bool is_easy() const noexcept { return worst_ <= 1.0 / 32; }
 
     /// Whether a reaction was beyond its bound at the start of the last step already.
     [[nodiscard]] bool starts_beyond() const noexcept { return starts_beyond_; }
@@ -97,7 +94,7 @@ private:
     struct End {
         double t = std::numeric_limits<double>::quiet_NaN();
         Mode mode = 0;
-        Motion motion;
+        Vector rate;
         Rooms rooms{}, change{};
     };
 
@@ -105,14 +102,15 @@ private:
     /// end.
     void evaluate(const Modes& modes, double t, const Vector& w, double ahead, End& end)
     {
-        modes.rooms(end.mode, t, w, end.motion, end.rooms);
+        modes.rooms(end.mode, t, w, motion_, end.rooms);
+        end.rate = motion_.rate;
         find_change(modes, t, w, ahead, end);
     }
     void find_change(const Modes& modes, double t, const Vector& w, double ahead, End& end)
     {
         end.t = t;
         const double step = nudge * ahead;
-        move(inside_, w, step, end.motion.rate);
+        move(inside_, w, step, end.rate);
         modes.rooms(end.mode, t + step, inside_, motion_, end.change);
         for (std::size_t k = 0; k < end.rooms.size(); ++k) {
             const double change = (end.change[k] - end.rooms[k]) / step;
@@ -128,7 +126,7 @@ private:
         // One component at a time, as they were written: see components.hpp.
         for_each_component(inside_, [&](auto i) {
             inside_[i] = at[0] * step.w0[i] + at[1] * step.w1[i] +
-                         h * (at[2] * start_.motion.rate[i] + at[3] * end_.motion.rate[i]);
+                         h * (at[2] * start_.rate[i] + at[3] * end_.rate[i]);
         });
         modes.rooms(step.mode, step.t0 + s * h, inside_, motion_, rooms_);
         double rounding = -1;

@@ -62,6 +62,10 @@ public:
         matrices().subtract_offset_rate(t, rate);
         write(rate, rates, reactions());
     }
+    [[nodiscard]] bool keeps_sides(Mode, double, const double*, double*) const override
+    {
+        return false;  // there are no branches
+    }
     [[nodiscard]] double size_of_row(std::size_t i, const double* x) const override
     {
         double largest = 0;
@@ -193,6 +197,7 @@ public:
     {
         std::fill_n(dxdt, size(), 0.0);
     }
+    [[nodiscard]] BranchStepper stepper(MethodName, Mode) noexcept override { return {}; }
     void reaction(Mode, double, const double*, double* r) const override { reaction_of_step(r); }
     void reaction_of_step(double* r) const override { write(to_.reaction, r, reactions()); }
     void selected_reaction(double t, const double* x, double* r) override
@@ -304,7 +309,7 @@ public:
 
 protected:
     [[nodiscard]] const Matrices& matrices() const noexcept { return step_.matrices(); }
-    [[nodiscard]] static Eigen::Index index(std::size_t i) noexcept
+    [[nodiscard]] static constexpr Eigen::Index index(std::size_t i) noexcept
     {
         return static_cast<Eigen::Index>(i);
     }

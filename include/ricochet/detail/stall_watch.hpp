@@ -20,11 +20,17 @@ public:
     /// Called at time t, after that many steps.
     [[nodiscard]] bool operator()(double t, std::uint64_t steps) noexcept
     {
-        if (most_ == 0 || steps < due_) return false;
+        if (!is_due(steps)) return false;
         const bool stalls = t - t_ < least_;
         due_ = steps + most_;
         t_ = t;
         return stalls;
+    }
+
+    /// Whether it compares times after that many steps.
+    [[nodiscard]] bool is_due(std::uint64_t steps) const noexcept
+    {
+        return most_ != 0 && steps >= due_;
     }
 
 private:

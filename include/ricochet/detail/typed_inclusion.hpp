@@ -206,14 +206,14 @@ class TypedInclusion {
         }
     }
 
+    template <bool diagonal>
     static void branch_state(const void* system, const Terms& terms, Mode mode, double t,
                              const State& w, MotionInBranches<N, M>& out)
     {
         // Works on copies, since the output may overlap the input.
         const OwnState here = by_components(w.data());
         OwnState motion;
-        terms.diagonal ? free_rate<true>(at(system), terms, t, here, motion)
-                       : free_rate<false>(at(system), terms, t, here, motion);
+        free_rate<diagonal>(at(system), terms, t, here, motion);
         const OwnReaction acting = reactions(at(system), terms, mode, t, here, motion);
         add_reactions(terms, acting, motion);
         copy_padded(motion, out.rate);
@@ -363,7 +363,7 @@ class TypedInclusion {
     }
 
 public:
-    /// Called by `BranchFlow`.
+    /// Called by `FlowByComponents`.
     template <bool diagonal>
     [[gnu::always_inline]] static void flow(const void* system, const Terms& terms, Mode mode,
                                             double t, const State& w, State& rate)
@@ -457,9 +457,10 @@ public:
             };
         }
         if constexpr (branching) {
-            out.flow = &Table::Flow::template call<TypedInclusion, false>;
-            out.flow_of_diagonal = &Table::Flow::template call<TypedInclusion, true>;
-            out.branch_state = branch_state;
+            out.flow = &Table::Flow::template call<TypedInclusion, Terms, false>;
+            out.flow_of_diagonal = &Table::Flow::template call<TypedInclusion, Terms, true>;
+            out.branch_state = branch_state<false>;
+            out.branch_state_of_diagonal = branch_state<true>;
         }
         if constexpr (declares_inputs) {
             out.step_layout = []() -> const StepLayout& { return System::step_layout(); };
