@@ -73,7 +73,7 @@ protected:
           error_controlled_(setup.error_controlled),
           guarded_(system_->guarded),
           phases_(system_->phases),
-          own_guards_(phases_ ? phases_->own_guards(setup.door) : no_guard),
+          own_guards_(phases_ ? phases_->own_guards(phases_->door) : no_guard),
           resets_any_(system_->resets()),
           timed_(system_->timed()),
           defers_(defers(setup.detector, *setup.system)),
@@ -128,7 +128,7 @@ protected:
                               step_.mode(),
                               resets_.mode(),
                               search_.before()};
-        resets_.move_to(phases_->decide(system_.door(), set, resets_.after()));
+        resets_.move_to(phases_->decide(phases_->door, set, resets_.after()));
     }
 
     /// Records the changes of reactions at a set that no guard of the system stands for.

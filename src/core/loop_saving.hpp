@@ -86,10 +86,10 @@ template <class Visitor>
 void Loop<X, single>::visit_phases(Visitor&& visit)
 {
     std::vector<double> memory;
-    phases_->save(system_.door(), memory);
+    phases_->save(phases_->door, memory);
     for (double& number : memory) visit(number);
     if constexpr (!std::remove_cvref_t<Visitor>::saves) {
-        phases_->restore(system_.door(), memory);
+        phases_->restore(phases_->door, memory);
     }
 }
 

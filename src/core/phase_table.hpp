@@ -3,7 +3,7 @@
 // A mode of such a run is a mode of the system and, in the bits above it, the kind of phase: kind 0
 // is the system's own flow. Who takes the steps depends on the mode; a step may end at a change
 // that its stepper has located by itself; after the resets of every set the phases decide how the
-// motion goes on. Everything else is the loop's. Functions take the door of the system's table.
+// motion goes on. Everything else is the loop's.
 #pragma once
 
 #include <cstddef>
@@ -11,19 +11,11 @@
 #include <string_view>
 #include <vector>
 
+#include "ricochet/detail/own_mode.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/integrate/run.hpp"
 
 namespace ricochet::detail {
-
-/// Modes of the system lie below this.
-inline constexpr Mode own_modes = Mode{1} << 24;
-
-/// The mode of the system, without the kind of phase.
-[[nodiscard]] constexpr Mode own_mode(Mode mode) noexcept
-{
-    return mode & (own_modes - 1);
-}
 
 /// What takes the steps in a mode.
 template <class X>
@@ -97,6 +89,8 @@ struct PhaseVerdict {
 template <class X>
 struct PhaseTable {
     using Door = void*;
+
+    Door door = nullptr;  ///< first argument of the functions
 
     /// The number of guards of the system. Those behind them belong to the phases: their crossings
     /// cut steps, and are no events by themselves.

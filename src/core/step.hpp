@@ -775,7 +775,7 @@ private:
     /// Steps are taken by the stepper of the mode from here on.
     [[gnu::cold, gnu::noinline]] void change_stepper()
     {
-        const Stepper<X> stepper = system_->phases->stepper(system_.door(), state_.mode);
+        const Stepper<X> stepper = system_->phases->stepper(system_->phases->door, state_.mode);
         const bool changes = kernel_ != stepper.kernel;
         kernel_ = stepper.kernel;
         stepping_ = stepper.door;

@@ -90,7 +90,7 @@ private:
         return *static_cast<PhasedSystem*>(door);
     }
 
-    [[nodiscard]] static constexpr Kind kind_of(Mode mode) noexcept { return mode / own_modes; }
+    [[nodiscard]] static constexpr Kind kind_of(Mode mode) noexcept { return kind_of_phase(mode); }
     [[nodiscard]] static constexpr Mode with(Kind kind, Mode mode) noexcept
     {
         return kind * own_modes + mode;
@@ -814,6 +814,7 @@ template <class C>
 void PhasedSystem<C>::make_phases()
 {
     PhaseTable<C>& t = phases_;
+    t.door = this;
     t.own_guards = [](void* door) { return at(door).guards_; };
     t.stepper = [](void* door, Mode mode) { return at(door).stepper(mode); };
     t.enter = [](void* door, Mode mode, double time, C& x) {

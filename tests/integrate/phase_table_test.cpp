@@ -113,6 +113,7 @@ private:
 
     void make_phases()
     {
+        phases_.door = this;
         phases_.own_guards = [](void*) { return std::size_t{1}; };
         phases_.stepper = [](void* door, Mode mode) -> Stepper<C> {
             Sawtooth& me = at(door);
