@@ -23,7 +23,7 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
             return false;
         }
     }
-    if (bank_.size() == 0) return false;
+    if (bank_.size() == 0 || (phases_ && bank_.is_idle())) return false;
     sample_end();
     const bool dips = !single && defers_ && bounds_show_event();
     if (any_suspicious() || dips || has_ties()) return true;

@@ -72,10 +72,14 @@ public:
     void heed_enabled() noexcept
     {
         selective_ = false;
+        idle_ = true;
         for (std::size_t i = 0; i < size(); ++i) {
             selective_ = selective_ || records_[i].info.boolean || !records_[i].enabled;
+            idle_ = idle_ && !records_[i].enabled;
         }
     }
+    /// Whether there is no guard, or none is enabled.
+    [[nodiscard]] bool is_idle() const noexcept { return idle_; }
 
 protected:
     void sample(const SamplePoint<X>& at, std::uint64_t& calls, Doubles& g, Doubles& rates)
@@ -229,6 +233,7 @@ protected:
     BankRules rules_;
     bool backward_;
     bool selective_ = false;  ///< whether any guard is disabled or has no rate
+    bool idle_ = true;
     PerGuard<GuardRecord, single> records_{};
     /// 1 for a guard whose record is that of a guard armed away from its surface, with no part in
     /// the last set: nothing of it changes while it stays on its side. Else 0.
