@@ -1,4 +1,4 @@
 #include "ricochet/nonsmooth/contact_motion.hpp"
 
 RICOCHET_TIME_STEPPING_OF(3, )
-RICOCHET_CONTACT_MOTION_OF(3, Dopri5, )
+RICOCHET_CONTACT_MOTION_OF(3, )

@@ -95,55 +95,6 @@ HandOverOptions completed(HandOverOptions options, bool locate)
     return options;
 }
 
-Options event_options(const HandOverOptions& options, double t, std::size_t samples,
-                      std::uint64_t steps)
-{
-    Options out{.t_start = t,
-                .t_end = options.t_end,
-                .rtol = options.rtol,
-                .atol = options.atol,
-                .h_max = options.h_max,
-                .event_tolerance = options.event_tolerance};
-    out.sample_times.assign(options.sample_times.begin() + static_cast<std::ptrdiff_t>(samples),
-                            options.sample_times.end());
-    out.max_steps = options.max_steps - steps;
-    out.cancelled = options.cancelled;
-    return out;
-}
-
-void add(Statistics& sum, const Statistics& more) noexcept
-{
-    sum.steps += more.steps;
-    sum.rejected += more.rejected;
-    sum.refined_steps += more.refined_steps;
-    sum.unresolved_steps += more.unresolved_steps;
-    sum.resteps += more.resteps;
-    sum.flow_calls += more.flow_calls;
-    sum.guard_calls += more.guard_calls;
-    sum.network_calls += more.network_calls;
-    sum.false_alarms += more.false_alarms;
-    sum.missed_events += more.missed_events;
-    sum.late_events += more.late_events;
-    sum.checks_deferred += more.checks_deferred;
-    sum.outside_domain += more.outside_domain;
-    sum.bound_calls += more.bound_calls;
-    sum.rollbacks += more.rollbacks;
-    sum.repeated_steps += more.repeated_steps;
-    sum.events += more.events;
-    sum.suppressed += more.suppressed;
-    sum.disabled += more.disabled;
-    sum.unmet_conditions += more.unmet_conditions;
-    sum.ineffective_resets += more.ineffective_resets;
-    if (more.declined_guard != no_guard) sum.declined_guard = more.declined_guard;
-    sum.either_relays += more.either_relays;
-    if (more.relay_guard != no_guard) sum.relay_guard = more.relay_guard;
-    sum.armed_beyond += more.armed_beyond;
-    sum.evidence.proved += more.evidence.proved;
-    sum.evidence.checked += more.evidence.checked;
-    sum.evidence.gated += more.evidence.gated;
-    sum.evidence.assumed += more.evidence.assumed;
-}
-
 std::optional<PhaseCause> cause_after(Outcome outcome) noexcept
 {
     switch (outcome) {

@@ -107,7 +107,7 @@ BranchPhasesOptions branch_options(const HandOverOptions& completed)
             .event_tolerance = completed.event_tolerance};
 }
 
-Options options_of_branches(const HandOverOptions& completed)
+Options loop_options(const HandOverOptions& completed)
 {
     Options out{.t_start = completed.t_start,
                 .t_end = completed.t_end,

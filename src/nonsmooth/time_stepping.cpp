@@ -75,6 +75,37 @@ void check_direction(int contact, const Eigen::VectorXd& row, const Eigen::Vecto
                     contact, fmt::join((low + high) / 2, ", "), fmt::join(row, ", ")));
 }
 
+void check_surface_rate(int contact, double rate, double t,
+                        const std::function<double(double)>& gap)
+{
+    // The shorter difference halves the error of the longer one where the gap is smooth, and both
+    // agree unless it is not, or rounding prevails.
+    if (!std::isfinite(rate)) return;
+    const double here = gap(t);
+    double least = std::numeric_limits<double>::infinity(), slope = rate;
+    for (const double length : {1e-3, 1e-6, 1e-9}) {
+        const double h = length * (1 + std::fabs(t));
+        const double far = (gap(t + h) - here) / h, near = (gap(t + h / 2) - here) / (h / 2);
+        if (!(std::fabs(far - near) < least)) continue;
+        least = std::fabs(far - near);
+        slope = near;
+    }
+    if (std::fabs(rate - slope) <= 0.01 * std::max(std::fabs(rate), std::fabs(slope)) + 2 * least)
+        return;
+    throw std::invalid_argument(
+        fmt::format("contact {}: surface_rates must begin with the rate of its gap where v = 0, "
+                    "about {:.3g}, got {:.3g}",
+                    contact, slope, rate));
+}
+
+DryFriction checked(const DryFriction& of)
+{
+    if (of.force >= 0 && std::isfinite(of.force)) return of;
+    throw std::invalid_argument(
+        fmt::format("coordinate {}: dry_friction must be finite, zero or positive, got {}",
+                    of.coordinate, of.force));
+}
+
 }  // namespace detail
 
 }  // namespace ricochet

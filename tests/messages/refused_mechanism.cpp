@@ -13,6 +13,11 @@ using Vector = Eigen::Vector2d;
 // CASE 4: found no `directions` that fits
 // CASE 5: found no `restitution` or `friction` that fits
 // CASE 6: found tangents outside its range
+// CASE 7: found no `surface_rates` that fits
+// CASE 8: found `gaps` with a time, and no `surface_rates`
+// CASE 9: found no `dry_friction` that fits
+// CASE 10: found a mechanism with `rest`
+// CASE 11: found a reset whose parameters or result do not fit
 struct Point {
     static constexpr int coordinates = 2;
     static constexpr int contacts = 1;
@@ -38,6 +43,11 @@ struct Point {
     double gaps(const Vector& q) const
     {
         return q[1];
+    }
+#elif CASE == 8
+    void gaps(double t, const Vector& q, Eigen::Matrix<double, 1, 1>& g) const
+    {
+        g[0] = q[1] - t;
     }
 #else
     void gaps(const Vector& q, Eigen::Matrix<double, 1, 1>& g) const
@@ -68,6 +78,37 @@ struct Point {
     {
         return 0;
     }
+#if CASE == 7
+    void surface_rates(const Vector&, Vector& b) const
+    {
+        b.setZero();
+    }
+#elif CASE == 9
+    void dry_friction(Vector& forces) const
+    {
+        forces.setZero();
+    }
+#elif CASE >= 10
+    double guard(double, const std::array<double, 4>& x) const
+    {
+        return x[0];
+    }
+#if CASE == 10
+    void reset(double, std::array<double, 4>& x) const
+    {
+        x[2] = -x[2];
+    }
+    void rest(double, std::array<double, 4>& x) const
+    {
+        x[2] = 0;
+    }
+#else
+    double reset(const std::array<double, 4>& x) const
+    {
+        return -x[2];
+    }
+#endif
+#endif
 };
 
 int main()

@@ -88,10 +88,6 @@ void check(const HandOverOptions& options, std::string_view who);
 /// The options with defaults filled in.
 /// @throws std::invalid_argument naming the option.
 [[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
-void add(Statistics& sum, const Statistics& more) noexcept;
-/// Options of an event-driven phase that begins at t, after `samples` samples and `steps` steps.
-[[nodiscard]] Options event_options(const HandOverOptions& options, double t, std::size_t samples,
-                                    std::uint64_t steps);
 /// Cause of the set-valued phase after an event-driven one with this outcome; nothing if the run is
 /// over.
 [[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;

@@ -116,7 +116,7 @@ private:
             make_branch_phases<N, M>(inclusion_of<N, M>(system), branch_options(given)));
         X x;
         Eigen::Map<Vector>(x.data()) = w0;
-        Options of = options_of_branches(given);
+        Options of = loop_options(given);
         if (!controlled) of.step = given.set_valued.step;
         return make_phased_run<C>(std::move(setup), core_state(x), of);
     }

@@ -54,14 +54,13 @@
 #define RICOCHET_INCLUSIONS_OF_(N, M) \
     RICOCHET_INCLUSIONS_OF_extern(N, M) RICOCHET_SET_VALUED_OF(N, M) RICOCHET_HAND_OVER_OF(N, M)
 
-/// Time stepping of N coordinates, and the hand-over from flight by one method.
-#define RICOCHET_TIME_STEPPING_OF(N, how) how template class ricochet::detail::AnyTimeStepping<N>;
-#define RICOCHET_CONTACT_MOTION_OF(N, Method, how)                                           \
-    how template class ricochet::detail::AnyContactMotion<N>;                                \
-    how template std::unique_ptr<ricochet::detail::EventLoop<2 * N>>                         \
-    ricochet::detail::make_flight_loop<N, ricochet::ErrorControlled<ricochet::Method>>(      \
-        const ricochet::detail::AnyFlight<N>&, const ricochet::detail::EventLoop<2 * N>::X&, \
-        const ricochet::Options&);
+/// Time stepping of N coordinates, and what the phases of a mechanism need.
+#define RICOCHET_TIME_STEPPING_OF(N, how)               \
+    how template class ricochet::detail::MoreauStep<N>; \
+    how template class ricochet::detail::AnyTimeStepping<N>;
+#define RICOCHET_CONTACT_MOTION_OF(N, how)             \
+    how template class ricochet::detail::AnyFlight<N>; \
+    how template class ricochet::detail::ContactStepsOf<N>;
 
 namespace ricochet::detail {
 

@@ -81,8 +81,8 @@ struct PhasedCounts {
 /// @throws std::invalid_argument for options that a run with phases does not have.
 [[nodiscard]] BranchPhasesOptions branch_options(const Options& options);
 [[nodiscard]] BranchPhasesOptions branch_options(const HandOverOptions& completed);
-/// Options of the loop for those of an inclusion alone.
-[[nodiscard]] Options options_of_branches(const HandOverOptions& completed);
+/// Options of the loop for those of a hand-over.
+[[nodiscard]] Options loop_options(const HandOverOptions& completed);
 
 /// @throws std::invalid_argument for options that a run with phases does not have, and for a start
 /// from which no reaction follows.

@@ -571,7 +571,11 @@ private:
 
     detail::Owner<const System> own_;  ///< where it was a temporary
     detail::Owner<Parts> parts_;
+
+protected:
     detail::LoopOf<System, X, Stepping, Detector> loop_;
+
+private:
     mutable Shown shown_;
 };
 

@@ -7,7 +7,7 @@
 // closed within it. The order is 1, and positions may go behind their
 // constraints by a step times their velocity; but no impacts can accumulate or be missed.
 //
-// A system is a value with
+// A mechanism is a value with
 //
 //     coordinates, contacts      static constexpr int
 //     tangents                   static constexpr int, 1 or 2 per contact
@@ -18,6 +18,13 @@
 //                                its tangential velocities
 //     restitution(c)             Newton's coefficient of contact c, in [0, 1]
 //     friction(c)                Coulomb's coefficient, finite, zero or positive
+//
+// and, where it has them,
+//
+//     gaps(t, q, g), directions(t, q, H)    surfaces that move; then also
+//     surface_rates(t, q, b)     relative velocities of the contacts where v = 0, in the order of
+//                                the rows of H: dg/dt, and velocities of slip
+//     dry_friction(i)            force of constant dry friction of coordinate i, zero or positive
 #pragma once
 
 #include <Eigen/Dense>
@@ -31,8 +38,8 @@
 #include <vector>
 
 #include "ricochet/detail/any_mechanism.hpp"
-#include "ricochet/detail/contact_problem.hpp"
 #include "ricochet/detail/inclusion_sizes.hpp"
+#include "ricochet/detail/moreau_step.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {
@@ -65,18 +72,53 @@ void check_contact(int contact, double restitution, double friction, double gap,
 void check_direction(int contact, const Eigen::VectorXd& row, const Eigen::VectorXd& q,
                      const std::function<double(const Eigen::VectorXd&)>& gap);
 
+/// The same for the rate of a gap in a position that stands still, by differences ahead of t.
+void check_surface_rate(int contact, double rate, double t,
+                        const std::function<double(double)>& gap);
+
 }  // namespace detail
 
-/// Counts over one motion by time stepping.
-struct TimeSteppingStatistics {
-    std::uint64_t steps = 0;
-    std::uint64_t problems = 0;    ///< steps with a closed contact
-    std::uint64_t iterations = 0;  ///< iterations of Newton's method in them
-    std::uint64_t sweeps = 0;
-    std::uint64_t unsolved = 0;  ///< steps that were repeated at half the length
-};
-
 namespace detail {
+
+/// @throws std::invalid_argument for a time, position or velocity that is not finite.
+template <class Vector>
+void check_finite(double t, const Vector& q, const Vector& v)
+{
+    if (!std::isfinite(t)) refuse_inclusion("the time at the start must be finite, not", t);
+    if (!q.allFinite()) refuse_inclusion("the initial position is not finite");
+    if (!v.allFinite()) refuse_inclusion("the initial velocity is not finite");
+}
+
+/// Refuses what no mechanism may start with, at time t. @throws std::invalid_argument
+template <int N>
+void check_start(const AnyMechanism<N>& system, double t, const Eigen::Matrix<double, N, 1>& q,
+                 const Eigen::Matrix<double, N, 1>& v)
+{
+    check_finite(t, q, v);
+    Eigen::VectorXd gaps;
+    system.gaps(t, q, gaps);
+    for (int c = 0; c < system.contacts; ++c) {
+        check_contact(c, system.restitution(c), system.friction(c), gaps[c],
+                      1e-12 * (1 + q.norm()));
+    }
+    Eigen::Matrix<double, N, N> mass;
+    system.mass(q, mass);
+    if (!mass.allFinite() ||
+        Eigen::LLT<Eigen::Matrix<double, N, N>>(mass).info() != Eigen::Success) {
+        refuse_inclusion("the mass matrix is not positive definite");
+    }
+    typename AnyMechanism<N>::Directions directions;
+    Eigen::VectorXd rates;
+    system.directions(t, q, directions);
+    if (system.moves) system.surface_rates(t, q, rates);
+    for (int c = 0; c < system.contacts; ++c) {
+        const int row = c * system.components;
+        check_direction(c, directions.row(row), q,
+                        [&](const Eigen::VectorXd& at) { return system.gap(c, t, at); });
+        if (!system.moves) continue;
+        check_surface_rate(c, rates[row], t, [&](double at) { return system.gap(c, at, q); });
+    }
+}
 
 /// `TimeStepping` for systems of any type.
 template <int N>
@@ -84,26 +126,36 @@ class RICOCHET_ALIGNED AnyTimeStepping {
 public:
     using Vector = Eigen::Matrix<double, N, 1>;
     using Square = Eigen::Matrix<double, N, N>;
-
-    struct State {
-        double t = 0;
-        Vector q, v;
-        Eigen::VectorXd impulse;  ///< of the last step [N s], normal first; zero where open
-    };
+    using State = typename MoreauStep<N>::State;
 
     AnyTimeStepping(const AnyMechanism<N>& system, const Vector& q, const Vector& v,
-                    const TimeSteppingOptions& options);
+                    const TimeSteppingOptions& options)
+        : options_(options), step_(system, options.contacts)
+    {
+        validate(options);
+        check_start(system, options.t_start, q, v);
+        next_ = step_.start(options_.t_start, q, v);
+        restart(options_.t_start, q, v);
+    }
 
-    /// Restarts from (t, q, v), when an integrator of free flight hands over.
+    /// Restarts from (t, q, v).
     /// @throws std::invalid_argument for a time, position or velocity that is not finite.
-    void restart(double t, const Vector& q, const Vector& v);
+    void restart(double t, const Vector& q, const Vector& v)
+    {
+        check_finite(t, q, v);
+        state_ = step_.start(t, q, v);
+        outcome_ = t < options_.t_end ? Outcome::running : Outcome::reached_end;
+    }
 
     [[nodiscard]] const State& state() const noexcept { return state_; }
-    [[nodiscard]] const TimeSteppingStatistics& statistics() const noexcept { return statistics_; }
+    [[nodiscard]] const TimeSteppingStatistics& statistics() const noexcept
+    {
+        return step_.statistics();
+    }
     [[nodiscard]] Outcome outcome() const noexcept { return outcome_; }
     /// The contact problem that ended the run as `not_converged`; its residual is infinite and
     /// its contact -1 where a force, a gap, a direction or the velocity was not finite.
-    [[nodiscard]] const ContactReport& failure() const noexcept { return failure_; }
+    [[nodiscard]] const ContactReport& failure() const noexcept { return step_.failure(); }
 
     Outcome advance();
 
@@ -122,155 +174,36 @@ public:
     }
 
 private:
-    static void check_start(double t, const Vector& q, const Vector& v)
+    [[nodiscard]] bool take(double h)
     {
-        if (!std::isfinite(t)) refuse_inclusion("the time at the start must be finite, not", t);
-        if (!q.allFinite()) refuse_inclusion("the initial position is not finite");
-        if (!v.allFinite()) refuse_inclusion("the initial velocity is not finite");
-    }
-
-    bool take(double h)
-    {
-        middle_ = state_.q + (h / 2) * state_.v;
-        system_->mass(middle_, mass_);
-        system_->force(state_.t + h / 2, middle_, state_.v, force_);
-        system_->gaps(middle_, gaps_);
-        factor_.compute(mass_);
-        velocity_ = state_.v + h * factor_.solve(force_);
-        if (factor_.info() != Eigen::Success || !velocity_.allFinite() || gaps_.hasNaN()) {
-            return fail_finite();
-        }
-        closed_.clear();
-        for (int c = 0; c < system_->contacts; ++c) {
-            if (gaps_[c] <= 0) closed_.push_back(c);
-        }
-        impulse_.setZero();
-        if (!closed_.empty() && !collide()) return false;
-        if (!velocity_.allFinite()) return fail_finite();
-        state_.v = velocity_;
-        state_.q = middle_ + (h / 2) * velocity_;
-        state_.t += h;
-        state_.impulse = impulse_;
+        if (!step_.take(0, state_, h, next_)) return false;
+        std::swap(state_, next_);
         return true;
     }
 
-    bool fail_finite()
-    {
-        failure_ = {.residual = std::numeric_limits<double>::infinity()};
-        return false;
-    }
-
-    bool collide()
-    {
-        ++statistics_.problems;
-        system_->directions(middle_, directions_);
-        const int D = system_->components;
-        const auto n = static_cast<Eigen::Index>(closed_.size()) * D;
-        h_.resize(n, N);
-        friction_.clear();
-        for (std::size_t k = 0; k < closed_.size(); ++k) {
-            const int c = closed_[k];
-            h_.middleRows(static_cast<Eigen::Index>(k) * D, D) = directions_.middleRows(c * D, D);
-            friction_.push_back(system_->friction(c));
-        }
-        inverse_ = factor_.solve(h_.transpose());
-        w_.noalias() = h_ * inverse_;
-        q_.noalias() = h_ * velocity_;
-        p_.setZero(n);
-        for (std::size_t k = 0; k < closed_.size(); ++k) {
-            const auto row = static_cast<Eigen::Index>(k) * D;
-            q_[row] += system_->restitution(closed_[k]) * h_.row(row).dot(state_.v);
-            p_.segment(row, D) = state_.impulse.segment(closed_[k] * D, D);
-        }
-        if (!w_.allFinite() || !q_.allFinite()) return fail_finite();
-        const ContactReport report = solver_.solve(w_, q_, friction_, D, p_);
-        statistics_.iterations += static_cast<std::uint64_t>(report.iterations);
-        statistics_.sweeps += static_cast<std::uint64_t>(report.sweeps);
-        if (!report.converged) {
-            failure_ = report;
-            if (report.contact >= 0)
-                failure_.contact = closed_[static_cast<std::size_t>(report.contact)];
-            return false;
-        }
-        velocity_.noalias() += inverse_ * p_;
-        for (std::size_t k = 0; k < closed_.size(); ++k) {
-            const Eigen::Index first = static_cast<Eigen::Index>(closed_[k]) * D;
-            impulse_.segment(first, D) = p_.segment(static_cast<Eigen::Index>(k) * D, D);
-        }
-        return true;
-    }
-
-    Owned<AnyMechanism<N>> system_;
     TimeSteppingOptions options_;
-    ContactSolver solver_;
-    State state_;
-    Vector middle_, force_, velocity_;
-    Square mass_;
-    Eigen::LLT<Square> factor_;
-    Eigen::VectorXd gaps_, impulse_;
-    typename AnyMechanism<N>::Directions directions_;
-    Eigen::Matrix<double, Eigen::Dynamic, N> h_;
-    Eigen::Matrix<double, N, Eigen::Dynamic> inverse_;
-    Eigen::MatrixXd w_;
-    Eigen::VectorXd q_, p_;
-    std::vector<int> closed_;
-    std::vector<double> friction_;
-    TimeSteppingStatistics statistics_;
-    ContactReport failure_;
+    MoreauStep<N> step_;
+    State state_, next_;
     Outcome outcome_ = Outcome::running;
 };
-
-template <int N>
-AnyTimeStepping<N>::AnyTimeStepping(const AnyMechanism<N>& system, const Vector& q, const Vector& v,
-                                    const TimeSteppingOptions& options)
-    : system_(system), options_(options), solver_(options.contacts)
-{
-    validate(options);
-    check_start(options.t_start, q, v);
-    system_->gaps(q, gaps_);
-    for (int c = 0; c < system_->contacts; ++c) {
-        check_contact(c, system_->restitution(c), system_->friction(c), gaps_[c],
-                      1e-12 * (1 + q.norm()));
-    }
-    system_->mass(q, mass_);
-    if (!mass_.allFinite() || Eigen::LLT<Square>(mass_).info() != Eigen::Success) {
-        refuse_inclusion("the mass matrix is not positive definite");
-    }
-    system_->directions(q, directions_);
-    for (int c = 0; c < system_->contacts; ++c) {
-        check_direction(c, directions_.row(c * system_->components), q,
-                        [&](const Eigen::VectorXd& at) { return system_->gap(c, at); });
-    }
-    friction_.reserve(static_cast<std::size_t>(system.contacts));
-    closed_.reserve(static_cast<std::size_t>(system.contacts));
-    restart(options.t_start, q, v);
-}
-
-template <int N>
-void AnyTimeStepping<N>::restart(double t, const Vector& q, const Vector& v)
-{
-    check_start(t, q, v);
-    impulse_.setZero(system_->contacts * system_->components);
-    state_ = {t, q, v, impulse_};
-    outcome_ = t < options_.t_end ? Outcome::running : Outcome::reached_end;
-}
 
 template <int N>
 Outcome AnyTimeStepping<N>::advance()
 {
     if (outcome_ != Outcome::running) return outcome_;
+    TimeSteppingStatistics& counts = step_.statistics();
     const double left = options_.t_end - state_.t;
     double h = options_.step;
-    bool last = is_last_step(h, state_.t, options_.t_end, statistics_.steps);
+    bool last = is_last_step(h, state_.t, options_.t_end, counts.steps);
     if (last) h = left;
     // Another length gives another problem, which may be easier.
     for (int attempt = 0; !take(h); ++attempt) {
-        if (attempt == 10) return outcome_ = Outcome::not_converged;
-        ++statistics_.unsolved;
+        if (attempt == most_halvings) return outcome_ = Outcome::not_converged;
+        ++counts.unsolved;
         h /= 2;
         last = false;
     }
-    ++statistics_.steps;
+    ++counts.steps;
     if (last) {
         state_.t = options_.t_end;
         outcome_ = Outcome::reached_end;

@@ -23,7 +23,10 @@ struct Puck {
     double friction(int) const { return 0.2; }
 };
 
-void observe(double, const Eigen::Vector2d&, const Eigen::Vector2d&, const Eigen::VectorXd&) {}
+[[maybe_unused]] void observe(double, const Eigen::Vector2d&, const Eigen::Vector2d&,
+                              const Eigen::VectorXd&)
+{
+}
 }  // namespace
 
 int main()
