@@ -1,13 +1,13 @@
 #!/usr/bin/env python3
-"""What the library weighs: headers, lines, and what a user's file costs to compile.
+"""What a user's file costs to compile, and a fresh clone to build. `scripts/house` counts headers, lines and functions.
 
-usage: bench/house.py           counts and compile times, one line for each target
+usage: bench/house.py           compile times, one line for each target
        bench/house.py --clone   times a fresh clone: demo, the whole build, the quick tests
 
 Exit status 1 where a target is missed. The yardstick is the processor time of g++ for a file that
 includes <Eigen/Dense> and inverts a matrix of 3 x 3, at -O2: 1 s on the reference machine. Processor
 times of the compiler are the least of three, and given in yardsticks; the raw ones stand beside them.
-Times of a clone are what the clock shows. Needs universal-ctags.
+Times of a clone are what the clock shows.
 """
 import os
 import re
@@ -19,10 +19,6 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-BEFORE = 21061  # lines of integrate, detect, locate, hybrid, sensitivity and nonsmooth in d7ce008,
-                # the last commit before the core was compiled
-ENGINE = ("core", "integrate", "detect", "locate", "hybrid", "sensitivity", "nonsmooth")
-LOOP = ("core", "integrate", "detect", "locate", "hybrid", "detail")
 
 OWN_SYSTEM = """
 #include <array>
@@ -59,20 +55,6 @@ def line(passed, sentence, target, measured):
         missed.append(sentence)
 
 
-def headers(room=""):
-    return [path for path in sorted((ROOT / "include" / "ricochet" / room).rglob("*.hpp"))
-            if "detail" not in path.parts]
-
-
-def lines_of(paths):
-    return sum(path.read_bytes().count(b"\n") for path in paths)
-
-
-def sources(*rooms):
-    return [path for room in rooms for top in ("include/ricochet", "src")
-            for path in sorted((ROOT / top / room).rglob("*.?pp"))]
-
-
 def seconds_to_compile(text, options):
     """[s] Processor time of the compiler."""
     with tempfile.TemporaryDirectory() as folder:
@@ -93,46 +75,11 @@ def yardstick():
     return seconds_to_compile(YARDSTICK, ["-O2"])
 
 
-def functions(*rooms):
-    """(lines, number of parameters, name) of every function that has a body."""
-    listed = "\n".join(map(str, sources(*rooms)))
-    found = subprocess.run(
-        ["ctags", "--languages=C++", "--kinds-C++=f", "--fields=neS", "-f", "-", "-L", "-"],
-        input=listed, text=True, capture_output=True, check=True).stdout
-    for row in found.splitlines():
-        name, _, *fields = row.split("\t")
-        known = dict(field.split(":", 1) for field in fields if ":" in field)
-        if name.startswith("!") or "end" not in known:
-            continue
-        inner = re.sub(r"<[^<>()]*>", "", known.get("signature", "()"))[1:]
-        length = int(known["end"]) - int(known["line"]) + 1
-        yield length, inner.count(",") + 1, name
-
-
-def counts():
-    public = len(headers())
-    line(public <= 60, "public headers", "<= 80, then 60", f"{public} of C++, and ricochet.h for C")
+def preprocessed():
     text = subprocess.run(["g++", "-std=c++20", "-E", f"-I{ROOT}/include",
                            ROOT / "include/ricochet/ricochet.hpp"], check=True, capture_output=True)
     count = text.stdout.count(b"\n")
     line(count <= 100000, "preprocessed lines of ricochet.hpp", "<= 100000", str(count))
-    whole = lines_of(sources(""))
-    rooms = sorted({path.name for path in (ROOT / "src").iterdir() if path.is_dir()} | {"detail"})
-    line(whole <= 48000, "lines of library, command line and bindings", "<= 48000",
-         f"{whole}: " + ", ".join(f"{room} {lines_of(sources(room))}" for room in rooms))
-    engine, detail = lines_of(sources(*ENGINE)), lines_of(sources("detail"))
-    line(engine + detail <= 0.6 * BEFORE,
-         "lines of the engine's rooms beside those before it was compiled", f"<= 60 % of {BEFORE}",
-         f"{engine}, {100 * engine / BEFORE:.0f} %, and {detail} in detail/ for these and others")
-    longest = max((lines_of([path]), path.name) for path in sources(*LOOP))
-    line(longest[0] <= 600, "longest file of the loop's rooms and of detail", "<= 600 lines",
-         f"{longest[0]}, {longest[1]}")
-    found = sorted(functions(*LOOP), reverse=True)
-    line(found[0][0] <= 60, "longest function of the loop's rooms and of detail", "<= 60 lines",
-         ", ".join(f"{name} {length}" for length, _, name in found[:4]))
-    many = [(name, count) for _, count, name in found if count > 5]
-    line(not many, "functions of these with more than five parameters", "0",
-         f"{len(many)} of {len(found)}" + "".join(f"; {name} {count}" for name, count in many[:8]))
 
 
 def compile_times():
@@ -185,6 +132,6 @@ if __name__ == "__main__":
     if sys.argv[1:2] == ["--clone"]:
         clone()
     else:
-        counts()
+        preprocessed()
         compile_times()
     sys.exit(1 if missed else 0)

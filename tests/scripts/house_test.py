@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""The figures of scripts/house."""
+import json
+import unittest
+
+from common import ROOT, output, script
+
+
+class House(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.house = script("house")
+        cls.figures = json.loads(output("scripts/house", "--json"))
+
+    def test_the_rooms_add_up_to_the_lines_of_the_files(self):
+        lines = {name: len((ROOT / name).read_text(errors="replace").splitlines()) for name in self.house.tracked()}
+        total = self.figures["total"]
+        of_tests = sum(n for name, n in lines.items() if name.startswith("tests/"))
+        self.assertEqual(total["tests"], of_tests)
+        self.assertEqual(total["code"] + total["comment"] + total["blank"], sum(lines.values()) - of_tests)
+        library = sum(n for name, n in lines.items() if name.startswith(("include/", "src/")))
+        self.assertEqual(sum(self.figures["library"].values()), library)
+        for key, count in total.items():
+            self.assertEqual(count, sum(row[key] for row in self.figures["rooms"].values()), key)
+
+    def test_every_header_is_public_or_detail_or_private(self):
+        headers = [p for top in ("include", "src") for ending in ("hpp", "h", "inc") for p in (ROOT / top).rglob(f"*.{ending}")]
+        total = self.figures["total"]
+        self.assertEqual(total["public"] + total["detail"] + total["private"], len(headers))
+
+    def test_arrows_against_the_order_are_those_that_are_listed(self):
+        against = [a for a in self.figures["arrows"] if not a["permitted"]]
+        self.assertEqual(sum(a["includes"] for a in against), len(self.figures["against"]))
+        self.assertTrue(self.house.may("scene", "core") and self.house.may("learn", "nonsmooth"))
+        self.assertFalse(self.house.may("core", "scene") or self.house.may("faults", "learn"))
+        self.assertTrue(self.house.may("room of tomorrow", "core"))
+
+    def test_lines_are_counted_as_what_they_hold(self):
+        text = 'int a;  // code\n\n// comment\n/* comment\n\n   */ int b;\nconst char* c = "// code";\n'
+        self.assertEqual(self.house.count_lines("a.cpp", text), (3, 2, 2))
+
+    def test_functions_are_found_with_their_lines(self):
+        text = """
+#define MACRO(x) if (x) { x(); }
+namespace a::b {
+template <class T = decltype(f())>
+struct S : Base<(1 > 0)> {
+    explicit(true) S(int x) : x_{x}, y_(x)
+    {
+    }
+    [[nodiscard]] auto operator()(Options o = {}) const noexcept(true) -> decltype(auto) { return 1; }
+    int x_ = f({1});
+    enum class E { a, b };
+};
+template <class T>
+    requires requires(T t) { t.x; }
+void S<T>::run(const char* c) &&
+{
+    if (c == "}") { f([] { return '{'; }); }
+    // }
+}
+MACRO(1)
+int values[] = {1, 2};
+int last() { return 1'000; }
+extern "C" { void in_c(void) { } }
+}
+"""
+        self.assertEqual(list(self.house.functions(text)),
+                         [("S", 3), ("operator()", 1), ("S<T>::run", 5), ("last", 1), ("in_c", 1)])
+
+
+if __name__ == "__main__":
+    unittest.main()
