@@ -7,6 +7,7 @@ with NumPy 2), and no network. Without --no-build-isolation pip fetches the newe
 """
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,7 @@ from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
 SOURCE = Path(__file__).resolve().parent
+VERSION = re.search(r"^ +VERSION ([0-9.]+)$", (SOURCE / "CMakeLists.txt").read_text(), re.M)[1]
 
 
 class CMakeBuild(build_ext):
@@ -43,6 +45,7 @@ class CMakeBuild(build_ext):
 
 
 setup(
+    version=VERSION,
     packages=["ricochet"],
     package_dir={"": "python"},
     package_data={"ricochet": ["*.pyi", "py.typed"]},

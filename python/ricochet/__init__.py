@@ -16,12 +16,10 @@ from ._network import Network
 from ._plot import plot
 from ._ready import (BouncingBall, CoulombOscillator, ImpactOscillator, Pendulum, StickSlip,
                      Thermostat)
-from ._ricochet import Run, Snapshot, Solution, Times
+from ._ricochet import Run, Snapshot, Solution, Times, __version__
 from ._run import Kind, Simulation, integrate
 from ._system import Guard, Stop, System, every, guard
 from ._training import Certified, Trained, certify, train_classifier, train_gate
-
-__version__ = "0.1.0"
 
 __all__ = [
     "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Certified", "Compiled",

@@ -7,6 +7,8 @@ from typing import (Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Opti
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+__version__: str
+
 C_FLOW: str
 C_GUARD: str
 C_RATE: str

@@ -19,6 +19,9 @@ PYTHONPATH="$work/site" MPLBACKEND=Agg "$python" "$source/tests/python/run.py" \
 import sys
 sys.path.insert(0, '$work/site')
 import importlib.metadata
-assert importlib.metadata.version('ricochet') == '0.1.0'
+import ricochet
+version = importlib.metadata.version('ricochet')
+assert version == ricochet.__version__, (version, ricochet.__version__)
+assert f'VERSION {version}\\n' in open('$source/CMakeLists.txt').read(), version
 licences = {f.name for f in importlib.metadata.files('ricochet')}
 assert {'LICENSE', 'LICENSE-THIRD-PARTY'} <= licences, licences"

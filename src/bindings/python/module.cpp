@@ -25,6 +25,7 @@ namespace py = pybind11;
 PYBIND11_MODULE(_ricochet, module)
 {
     using namespace ricochet::python;
+    module.attr("__version__") = RICOCHET_VERSION;
     py::register_exception_translator([](std::exception_ptr thrown) {
         try {
             if (thrown) std::rethrow_exception(thrown);
