@@ -34,6 +34,7 @@
 #include "ricochet/learn/policies.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
+#include "ricochet/scene/simulate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::file_fuzz {
@@ -548,6 +549,52 @@ private:
     std::vector<std::string> sound_;
 };
 
+// --- scenes ---
+
+/// Without a grid of bodies, of which a changed number asks for as much memory as a scene may have.
+class Scenes : public Format {
+public:
+    std::size_t sound_count() const override { return documents_.size(); }
+    std::string sound(std::size_t which) const override { return documents_[which].dump(1); }
+
+    std::string broken(Mutator& mutator) const override
+    {
+        json document = mutator.any_of(documents_);
+        for (std::uint64_t i = mutator.below(3); i < 3; ++i) mutator.change(document);
+        std::string text =
+            document.dump(mutator.one_in(2) ? 1 : -1, ' ', false, json::error_handler_t::replace);
+        if (mutator.one_in(10)) mutator.break_text(text);
+        return text;
+    }
+
+    void load_and_use(const std::string& bytes, Mutator& /*mutator*/) const override
+    {
+        const SceneFile file = refusing<SceneFileError>([&] { return read_scene(bytes, "f"); });
+        for (const Disc& body : file.scene.bodies()) {
+            if (!(body.mass > 0)) throw std::logic_error("a body without mass");
+        }
+    }
+
+private:
+    std::vector<json> documents_{json::parse(R"({
+            "gravity": [0, -9.81],
+            "materials": {"clay": {"restitution": 0.3, "friction": 0.1}},
+            "walls": [{"name": "floor", "normal": [0, 1], "point": [0, 0], "material": "clay"}],
+            "bodies": [
+                {"name": "a", "disc": {"radius": 0.1, "mass": 1}, "at": [0, 1], "velocity": [1, 0],
+                 "drag": 0.05, "material": "clay"},
+                {"name": "b", "point": {"mass": 2}, "at": [1, 1]}],
+            "springs": [{"between": ["a", "b"], "rest": 1, "stiffness": 10, "damping": 0.1}],
+            "run": {"t_end": 2, "rtol": 1e-8, "atol": 1e-10, "impacts": "together",
+                    "elastic_within": 1e-6, "contact_step": 1e-3, "sample_times": [0, 1],
+                    "max_events": 10}})"),
+                                 json::parse(R"({
+            "terrain": [{"name": "hill", "points": [[-1, 0], [0, 0.5], [1, 0]],
+                         "motion": {"amplitude": [0, 0.05], "frequency": 3, "phase": 0}}],
+            "bodies": [{"disc": {}, "at": [0, 2]}],
+            "run": {"t_end": 1}})")};
+};
+
 /// Every format by its name.
 [[nodiscard]] inline const std::map<std::string, std::function<std::unique_ptr<Format>()>>&
 formats()
@@ -558,6 +605,7 @@ formats()
         {"npy", [] { return std::make_unique<Npy>(); }},
         {"checkpoints", [] { return std::make_unique<Checkpoints>(); }},
         {"proofs", [] { return std::make_unique<Proofs>(); }},
+        {"scenes", [] { return std::make_unique<Scenes>(); }},
         {"snapshots", [] { return std::make_unique<Snapshots>(); }}};
     return all;
 }
