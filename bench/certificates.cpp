@@ -42,7 +42,7 @@ struct Scene {
     std::string name;
     std::size_t dimension;   ///< components that the guard depends on
     std::size_t components;  ///< number of components of the state
-    std::vector<Interval> domain;
+    std::vector<ValueRange> domain;
     double margin;
     double far;  ///< a tenth of the scene's scale
     std::vector<std::size_t> hidden;
@@ -77,7 +77,7 @@ Scene arm()
         std::make_shared<const PlanarArm<N>>(ArmScene::Parameters{.obstacles = 8, .grid = 0});
     const double link = system->scene().parameters().reach / N;
     const auto start = system->start();
-    std::vector<Interval> domain;
+    std::vector<ValueRange> domain;
     for (std::size_t i = 0; i < N; ++i) domain.push_back({start[i] - 1.5, start[i] + 1.5});
     for (std::size_t i = 0; i < N; ++i) domain.push_back({-2, 2});
     return {.name = fmt::format("arm{}", N),
@@ -115,7 +115,7 @@ Scene eigenvalue()
     return {.name = "eigenvalue",
             .dimension = 4,
             .components = 4,
-            .domain = std::vector<Interval>(4, {-1, 1}),
+            .domain = std::vector<ValueRange>(4, {-1, 1}),
             .margin = 0.02,
             .far = 0.1,
             .hidden = {64, 64},
@@ -141,7 +141,7 @@ public:
           adam_(mlp_.parameters().size(), {})
     {
         for (std::size_t i = 0; i < scene.dimension; ++i) {
-            const Interval& range = scene.domain[i];
+            const ValueRange& range = scene.domain[i];
             offset_.push_back(0.5 * (range.lower + range.upper));
             scale_.push_back(4 / (range.upper - range.lower));
         }

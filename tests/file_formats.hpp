@@ -462,7 +462,7 @@ public:
     Proofs()
     {
         learn::Progressed all;
-        const std::vector<std::vector<Interval>> boxes{{{0, 1}, {2, 3}}, {{1, 2}, {2, 3}}};
+        const std::vector<std::vector<ValueRange>> boxes{{{0, 1}, {2, 3}}, {{1, 2}, {2, 3}}};
         all.levels.push_back(
             {.margin = 0.1, .threshold = 0.5, .boxes = 7, .seconds = 1, .unproved = boxes});
         all.estimates = {{}, {}};

@@ -822,14 +822,18 @@ protected:
     {
         run_.armed_beyond.clear();
         run_.armed_on_surface.clear();
-        if (run_.statistics.armed_beyond == 0) return;
         for (std::size_t i = 0; i < std::min(bank_.size(), own_guards_); ++i) {
+            if (std::as_const(bank_)[i].armed_on) note_left_start(i);
             const GuardRecord& record = std::as_const(bank_)[i];
             if (!record.armed_beyond) continue;
             run_.armed_beyond.push_back(i);
             if (record.armed_on) run_.armed_on_surface.push_back(i);
         }
     }
+
+    /// Counts guard i as armed beyond its surface if it stood there at the start, by rounding, and
+    /// has left without an event.
+    void note_left_start(std::size_t i);
 
     /// Arms every guard at the start of a flight. Guards that have fired count as
     /// being on their surface up to the error of their location. Guards that the

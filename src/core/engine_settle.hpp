@@ -161,10 +161,23 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
     if (arming == life::Arming::waits) {
         // One that fires at the start has done so in the run before.
         const bool is_known = !begins && info.at_start && options_.continues;
-        if (record.acting && is_beyond(side, info.crossing) && !is_known) count_armed_beyond(i, on);
+        if (!record.acting || is_known) return;
+        if (is_beyond(side, info.crossing)) count_armed_beyond(i, on);
+        if (side == Side::plateau) bank_[i].armed_on = true;
     } else if (arming != life::Arming::outside && counts_here(i)) {
         have_event(i, arming, side);
     }
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::note_left_start(std::size_t i)
+{
+    const GuardRecord& record = std::as_const(bank_)[i];
+    if (record.armed_beyond || !std::isnan(record.last) || !record.enabled) return;
+    if (!is_beyond(record.side, record.info.crossing)) return;
+    const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
+    if (side_of(g) != record.side || std::fabs(g) <= rounding_of(i)) return;
+    count_armed_beyond(i, true);
 }
 
 template <class X, bool single>

@@ -153,6 +153,8 @@ public:
         showing_ = Showing::step;
     }
 
+    [[nodiscard]] std::size_t shown_events() const noexcept override { return shown_records_; }
+
     // --- quiet steps that are taken elsewhere ---
 
     bool go_to_quiet_steps(QuietRun& quiet, bool beyond) override;
@@ -302,6 +304,9 @@ private:
 
     void refuse_bad_restart(double t, const X& x, Mode mode) const;
     void start_at(double t, const X& x, Mode mode);
+    /// Drops what was recorded after t, but for the last `count` events, those of the restart
+    /// there, from `recorded` on, which `advance` is to show.
+    void show_from_restart(double t, std::ptrdiff_t recorded, std::uint64_t count);
     /// Drops what was recorded after time t.
     void drop_from(double t);
     /// Places the step where `visit_state` has read the place.

@@ -1,6 +1,8 @@
 // Interventions: a run that goes on from another place, or to another end.
 #pragma once
 
+#include <iterator>
+
 #include "core/loop.hpp"
 
 namespace ricochet::detail {
@@ -10,9 +12,11 @@ void Loop<X, single>::restart(double t, const X& x, Mode mode)
 {
     refuse_bad_restart(t, x, mode);
     if (is_tentative()) take_back();
+    const auto recorded = static_cast<std::ptrdiff_t>(run_.events.size());
+    const std::uint64_t counted = run_.statistics.events;
     Snapshot old;
     visit_state(SnapshotWriter(old));
-    std::vector<Phase> phases = run_.phases;
+    std::vector<MotionPhase> phases = run_.phases;
     try {
         this->who_ = "restart";
         start_at(t, x, mode);
@@ -20,13 +24,27 @@ void Loop<X, single>::restart(double t, const X& x, Mode mode)
     } catch (...) {
         this->who_ = "integrate";
         visit_state(SnapshotReader(old));
+        run_.events.erase(run_.events.begin() + recorded, run_.events.end());
         run_.phases = std::move(phases);
         go_on_from_place();
         throw;
     }
+    show_from_restart(t, recorded, run_.statistics.events - counted);
+    record_restart();
+}
+
+template <class X, bool single>
+void Loop<X, single>::show_from_restart(double t, std::ptrdiff_t recorded, std::uint64_t count)
+{
+    auto& events = run_.events;
+    const auto first = std::make_move_iterator(events.begin() + recorded);
+    std::vector<Event<X>> here(first, std::make_move_iterator(events.end()));
+    events.erase(events.begin() + recorded, events.end());
     drop_from(t);
     show_all();
-    record_restart();
+    shown_events_ -= count;
+    events.insert(events.end(), std::make_move_iterator(here.begin()),
+                  std::make_move_iterator(here.end()));
 }
 
 template <class X, bool single>

@@ -23,7 +23,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
     old.run = properties();
     require_same_run(snapshot.run, old.run);
     visit_state(SnapshotWriter(old));
-    std::vector<Phase> phases = run_.phases;
+    std::vector<MotionPhase> phases = run_.phases;
     try {
         SnapshotReader reader(snapshot);
         visit_state(reader);

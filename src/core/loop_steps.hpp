@@ -44,7 +44,9 @@ bool Loop<X, single>::show_next()
         return true;
     }
     const std::uint64_t count = run_.statistics.events;
-    return std::exchange(shown_events_, count) != count && !shows_events();
+    const bool at_end_of_step = std::exchange(shown_events_, count) != count && !shows_events();
+    if (at_end_of_step) shown_records_ = events.size();
+    return at_end_of_step;
 }
 
 template <class X, bool single>

@@ -116,7 +116,7 @@ struct PhaseTable {
     /// A sentence about the end that the phases have given to the run, or an empty one.
     std::string_view (*reason)(Door) = nullptr;
     /// Moves the list of phases to `phases`, where it goes on; may be null, as the two below.
-    void (*list_in)(Door, std::vector<Phase>& phases) = nullptr;
+    void (*list_in)(Door, std::vector<MotionPhase>& phases) = nullptr;
     /// Writes the reactions at a place in the current step, or in one that has just ended.
     void (*reaction)(Door, const PhasePlace<X>&, std::vector<double>& r) = nullptr;
     /// Adds to the result of the run what the phases know of it.

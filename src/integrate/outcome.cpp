@@ -166,8 +166,8 @@ std::string detail::describe_run(Outcome outcome, const std::string& reason,
         "began beyond its surface, and waited until it had returned (at_start and at_entry let it "
         "fire there)");
     say(armed_on_surface,
-        "began on its surface and moved on beyond it, which is no event (`continues` holds again "
-        "what was at rest, unilateral and at_start give it one)");
+        "began on its surface and moved on beyond it, which is no event (unilateral and at_start "
+        "give it one; a start from what a run has left at rest is held again by `continues`)");
     return out;
 }
 

@@ -87,7 +87,7 @@ struct FixedStepFloor : Floor {
                                    BouncingBall::State{ball.u, ball.v}, step, out);
     }
 
-    [[nodiscard]] std::vector<Interval> domain() const
+    [[nodiscard]] std::vector<ValueRange> domain() const
     {
         return {{.lower = lowest, .upper = highest}, {.lower = -fastest, .upper = fastest}};
     }
@@ -124,7 +124,7 @@ struct AnyStepFloor : Floor {
                                    BouncingBall::State{ball.u, ball.v}, ball.step, out);
     }
 
-    [[nodiscard]] std::vector<Interval> domain() const
+    [[nodiscard]] std::vector<ValueRange> domain() const
     {
         const double end = ricochet::detail::slog(largest);
         return {{.lower = -end, .upper = end}, {.lower = -end, .upper = end}};

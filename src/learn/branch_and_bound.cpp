@@ -146,7 +146,7 @@ bool Statement::proved_by_least(Box& box) const
 
 bool Statement::proved_by_logit(Box& box, NetworkBounds::Scratch& scratch, double* influence) const
 {
-    const Interval range =
+    const ValueRange range =
         bounds_.over(box.lower.data(), box.upper.data(), threshold_, scratch, influence);
     // A bound of the whole box holds for its parts, so bounds never get worse downwards.
     if (range.lower > box.low) box.low = range.lower;
@@ -175,7 +175,7 @@ std::size_t Statement::choose_axis(const Box& box, const double* half,
     std::size_t best = n_;
     double most = 0;
     for (std::size_t i = 0; i < n_; ++i) {
-        const Interval& range = classifier_.model().domain[i];
+        const ValueRange& range = classifier_.model().domain[i];
         const double m = middle(box.lower[i], box.upper[i]);
         const bool wide = box.upper[i] - box.lower[i] > smallest_ * (range.upper - range.lower) &&
                           box.lower[i] < m && m < box.upper[i];
@@ -234,7 +234,7 @@ void Statement::note(const Box& box, Verdict verdict, Tally& tally) const
     }
     if (verdict != Verdict::stuck) return;
     tally.lowest = std::min(tally.lowest, box.low);
-    std::vector<Interval> ranges;
+    std::vector<ValueRange> ranges;
     for (std::size_t i = 0; i < n_; ++i) ranges.push_back({box.lower[i], box.upper[i]});
     tally.unproved.push_back(std::move(ranges));
 }

@@ -34,7 +34,7 @@ struct Box {
 struct Tally {
     std::uint64_t boxes = 0;
     double lowest = std::numeric_limits<double>::infinity();  ///< logit in an unproved box
-    std::vector<std::vector<Interval>> unproved{};
+    std::vector<std::vector<ValueRange>> unproved{};
     std::vector<double> counterexample{};
 };
 

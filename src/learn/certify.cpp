@@ -378,7 +378,7 @@ private:
                                           const std::vector<double>& x)
     {
         return std::any_of(level.unproved.begin(), level.unproved.end(), [&](const auto& box) {
-            return std::equal(x.begin(), x.end(), box.begin(), [](double value, const Interval& r) {
+            return std::equal(x.begin(), x.end(), box.begin(), [](double value, const ValueRange& r) {
                 return value >= r.lower && value <= r.upper;
             });
         });
@@ -528,7 +528,7 @@ LowestLogit lowest_logit(const Model& model, const GuardProblem& problem, double
             const double radius = random.log_uniform(1e-6, 0.2);
             x = at.x;
             for (std::size_t k = 0; k < n; ++k) {
-                const Interval& range = model.domain[k];
+                const ValueRange& range = model.domain[k];
                 const double step = radius * (range.upper - range.lower) * random.uniform(-1, 1);
                 x[k] = std::clamp(x[k] + step, range.lower, range.upper);
             }

@@ -20,12 +20,12 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json json(const std::vector<std::vector<Interval>>& boxes)
+Json json(const std::vector<std::vector<ValueRange>>& boxes)
 {
     Json out = Json::array();
     for (const auto& box : boxes) {
         Json one = Json::array();
-        for (const Interval& range : box) one.push_back({range.lower, range.upper});
+        for (const ValueRange& range : box) one.push_back({range.lower, range.upper});
         out.push_back(one);
     }
     return out;
@@ -39,9 +39,9 @@ std::uint64_t count_of(const nlohmann::json& from)
 }
 
 /// @throws std::out_of_range for boxes of different dimensions
-std::vector<std::vector<Interval>> boxes_of(const nlohmann::json& from)
+std::vector<std::vector<ValueRange>> boxes_of(const nlohmann::json& from)
 {
-    std::vector<std::vector<Interval>> out;
+    std::vector<std::vector<ValueRange>> out;
     for (const nlohmann::json& box : from) {
         if (box.size() != from.front().size()) throw std::out_of_range("other dimensions");
         out.emplace_back();

@@ -109,12 +109,12 @@ std::vector<double> inverse_deviations(const DataSet& data, const std::vector<do
     return scale;
 }
 
-std::vector<Interval> ranges(const DataSet& data)
+std::vector<ValueRange> ranges(const DataSet& data)
 {
     constexpr double inf = std::numeric_limits<double>::infinity();
-    std::vector<Interval> domain(data.width(), {.lower = inf, .upper = -inf});
+    std::vector<ValueRange> domain(data.width(), {.lower = inf, .upper = -inf});
     for (std::size_t i = 0; i < data.features.size(); ++i) {
-        Interval& range = domain[i % data.width()];
+        ValueRange& range = domain[i % data.width()];
         range.lower = std::min(range.lower, data.features[i]);
         range.upper = std::max(range.upper, data.features[i]);
     }

@@ -492,9 +492,9 @@ private:
         return states > 0 ? sum / states : 1;
     }
 
-    [[nodiscard]] std::vector<Interval> box() const
+    [[nodiscard]] std::vector<ValueRange> box() const
     {
-        std::vector<Interval> box = training_.box;
+        std::vector<ValueRange> box = training_.box;
         for (std::size_t i = 0; i < box.size(); ++i) {
             box[i].lower = std::min(box[i].lower, validation_.box[i].lower);
             box[i].upper = std::max(box[i].upper, validation_.box[i].upper);

@@ -65,7 +65,7 @@ void NetworkBounds::check(const Model& model) const
                       std::to_string(n) + " features");
     }
     for (std::size_t i = 0; i < n; ++i) {
-        const Interval& range = model.domain[i];
+        const ValueRange& range = model.domain[i];
         const std::string feature = "feature " + std::to_string(i);
         if (!std::isfinite(range.lower) || !std::isfinite(range.upper) ||
             !(range.lower <= range.upper)) {
@@ -170,7 +170,7 @@ NetworkBounds::Place NetworkBounds::place(const double* lower, const double* upp
 
 /// Fills `low` and `high` of every hidden layer, and gives the range of the logit.
 template <std::size_t D>
-Interval NetworkBounds::forward(const Place& at, Scratch& s, double* influence) const noexcept
+ValueRange NetworkBounds::forward(const Place& at, Scratch& s, double* influence) const noexcept
 {
     constexpr std::size_t stride = D + 2;  // c, G_1 ... G_D, e
     std::size_t count = live_.size();
@@ -252,7 +252,7 @@ Interval NetworkBounds::forward(const Place& at, Scratch& s, double* influence) 
     return {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::quiet_NaN()};
 }
 
-Interval NetworkBounds::forward(const Place& at, Scratch& s, double* influence) const noexcept
+ValueRange NetworkBounds::forward(const Place& at, Scratch& s, double* influence) const noexcept
 {
     switch (live_.size()) {
         case 0:
@@ -311,11 +311,11 @@ double NetworkBounds::backward(const Place& at, Scratch& s) const noexcept
     return lower - reach - backward_gamma_ * size - underflow;
 }
 
-Interval NetworkBounds::over(const double* lower, const double* upper, double enough,
+ValueRange NetworkBounds::over(const double* lower, const double* upper, double enough,
                              Scratch& scratch, double* influence) const noexcept
 {
     const Place at = place(lower, upper);
-    Interval range = forward(at, scratch, influence);
+    ValueRange range = forward(at, scratch, influence);
     if (!(range.lower - evaluation_error_ >= enough) && layers_.size() > 1) {
         const double other = backward(at, scratch);
         if (other > range.lower) range.lower = other;

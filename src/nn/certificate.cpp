@@ -46,10 +46,10 @@ private:
     throw std::invalid_argument("cannot be read: " + what);
 }
 
-Json json(const std::vector<Interval>& box)
+Json json(const std::vector<ValueRange>& box)
 {
     Json out = Json::array();
-    for (const Interval& range : box) out.push_back(Json::array({range.lower, range.upper}));
+    for (const ValueRange& range : box) out.push_back(Json::array({range.lower, range.upper}));
     return out;
 }
 
@@ -82,9 +82,9 @@ std::string text(const Json& object, const char* name)
     return found.get<std::string>();
 }
 
-std::vector<Interval> box(const Json& value)
+std::vector<ValueRange> box(const Json& value)
 {
-    std::vector<Interval> out;
+    std::vector<ValueRange> out;
     if (!value.is_array()) refuse_certificate("expected a box to be a list of ranges");
     for (const Json& range : value) {
         if (!range.is_array() || range.size() != 2)
@@ -116,9 +116,9 @@ CertificateLevel level(const Json& from, std::size_t dimension)
     return out;
 }
 
-bool same(const std::vector<Interval>& a, const std::vector<Interval>& b)
+bool same(const std::vector<ValueRange>& a, const std::vector<ValueRange>& b)
 {
-    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](Interval x, Interval y) {
+    return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](ValueRange x, ValueRange y) {
         return x.lower == y.lower && x.upper == y.upper;
     });
 }
@@ -140,7 +140,7 @@ std::string fingerprint(const Model& model)
     hash.add(model.recipe);
     hash.add(model.offset);
     hash.add(model.scale);
-    for (const Interval& range : model.domain) {
+    for (const ValueRange& range : model.domain) {
         hash.add(range.lower);
         hash.add(range.upper);
     }

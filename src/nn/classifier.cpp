@@ -62,7 +62,7 @@ double Classifier::logit(const double* features) const noexcept
 bool Classifier::in_domain(const double* features) const noexcept
 {
     for (std::size_t i = 0; i < model_.domain.size(); ++i) {
-        const Interval& range = model_.domain[i];
+        const ValueRange& range = model_.domain[i];
         if (!(range.lower <= features[i] && features[i] <= range.upper)) return false;
     }
     return true;

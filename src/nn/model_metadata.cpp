@@ -208,7 +208,7 @@ void read_metadata(const Header& header, const Refusal& refuse, Model& model)
 
     const std::vector<double> domain = metadata.numbers("domain", 2 * inputs);
     for (std::size_t i = 0; i < inputs; ++i) {
-        const Interval range{domain[2 * i], domain[2 * i + 1]};
+        const ValueRange range{domain[2 * i], domain[2 * i + 1]};
         if (!(range.lower <= range.upper)) {
             refuse("metadata \"domain\" of feature " + std::to_string(i), "lower <= upper",
                    decimal(range.lower) + " and " + decimal(range.upper));
@@ -250,7 +250,7 @@ std::map<std::string, std::string> metadata_of(const Model& model, const SelfTes
         parameters += name + '=' + decimal(value);
     }
     std::vector<double> domain;
-    for (const Interval& range : model.domain) {
+    for (const ValueRange& range : model.domain) {
         domain.push_back(range.lower);
         domain.push_back(range.upper);
     }

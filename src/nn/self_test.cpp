@@ -96,7 +96,7 @@ SelfTest make_self_test(const Model& model, const Refusal& refuse)
         const double fraction = std::fmod(0.6180339887498949 * static_cast<double>(i + 1), 1.0);
         double value = model.offset[i] + fraction / model.scale[i];
         if (i < model.domain.size()) {
-            const Interval& range = model.domain[i];
+            const ValueRange& range = model.domain[i];
             const double inside = range.lower + fraction * (range.upper - range.lower);
             if (std::isfinite(inside)) value = inside;
         }

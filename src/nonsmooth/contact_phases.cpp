@@ -291,7 +291,7 @@ public:
 
     [[nodiscard]] AnyLoop<C>& loop() noexcept override { return *loop_; }
     [[nodiscard]] const AnyLoop<C>& loop() const noexcept override { return *loop_; }
-    [[nodiscard]] const std::vector<Phase>& phases() const noexcept override
+    [[nodiscard]] const std::vector<MotionPhase>& phases() const noexcept override
     {
         return phases_.phases();
     }
@@ -300,7 +300,7 @@ public:
         ContactStatistics out{.event_driven = run, .time_stepping = phases_.steps().statistics()};
         out.time_stepping.steps = phases_.steps_in_contact();
         out.event_driven.steps -= std::min(out.time_stepping.steps, run.steps);
-        const std::vector<Phase>& phases = this->phases();
+        const std::vector<MotionPhase>& phases = this->phases();
         for (std::size_t k = 0; k < phases.size(); ++k) {
             if (!phases[k].set_valued) {
                 out.to_flight += k > 0;

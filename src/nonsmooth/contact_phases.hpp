@@ -32,7 +32,7 @@ public:
     /// The same where the start is behind a contact.
     [[nodiscard]] Mode enter_stuck(Mode mode, double t);
 
-    [[nodiscard]] const std::vector<Phase>& phases() const noexcept { return phases_listed_; }
+    [[nodiscard]] const std::vector<MotionPhase>& phases() const noexcept { return phases_listed_; }
     [[nodiscard]] const ContactSteps& steps() const noexcept { return *setup_.steps; }
     [[nodiscard]] std::uint64_t steps_in_contact() const noexcept { return steps_in_contact_; }
     /// Whether the last step was one in contact.
@@ -97,7 +97,7 @@ private:
     SystemTable<C> table_;
     PhaseTable<C> rules_;
     Memory memory_;
-    std::vector<Phase> phases_listed_;
+    std::vector<MotionPhase> phases_listed_;
     std::uint64_t steps_in_contact_ = 0;
     bool took_ = false;  ///< a step in contact, which the rules have not seen yet
     bool was_in_contact_ = false;

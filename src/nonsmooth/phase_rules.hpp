@@ -233,7 +233,7 @@ public:
     /// A sentence about the end that the rules have given to the run.
     [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
     /// Moves the list of phases to `phases`, where it goes on.
-    void list_in(std::vector<Phase>& phases)
+    void list_in(std::vector<MotionPhase>& phases)
     {
         phases = std::move(*phases_);
         phases_ = &phases;
@@ -385,8 +385,8 @@ private:
     mutable std::vector<double> observed_;
     std::vector<ReactionChange> changes_;
     std::vector<BranchChange> branch_changes_;  ///< of an inclusion alone
-    std::vector<Phase> first_phases_;           ///< until the list is moved
-    std::vector<Phase>* phases_ = &first_phases_;
+    std::vector<MotionPhase> first_phases_;           ///< until the list is moved
+    std::vector<MotionPhase>* phases_ = &first_phases_;
     Kind kind_ = own;                       ///< at the end of the last step
     bool begins_ = false;                   ///< no step has been taken since the start
     PhaseCause cause_ = PhaseCause::start;  ///< why the phase that was entered last began

@@ -57,9 +57,9 @@ void StepRanges::include(const StepRanges& other) noexcept
     }
 }
 
-std::vector<Interval> StepRanges::domain(double margin) const
+std::vector<ValueRange> StepRanges::domain(double margin) const
 {
-    std::vector<Interval> out;
+    std::vector<ValueRange> out;
     if (empty()) return out;
     for (std::size_t i = 0; i < lower_.size(); ++i) {
         const double more = margin * (upper_[i] - lower_[i]);
@@ -112,7 +112,7 @@ std::optional<double> StepPolicy::factor(const StepRanges::Inputs& raw) const no
     StepRanges::Inputs in{};
     for (std::size_t i = 0; i < inputs; ++i) {
         if (!model_.domain.empty()) {
-            const Interval& range = model_.domain[i];
+            const ValueRange& range = model_.domain[i];
             if (!(raw[i] >= range.lower && raw[i] <= range.upper)) return std::nullopt;
         }
         in[i] = (raw[i] - model_.offset[i]) * model_.scale[i];

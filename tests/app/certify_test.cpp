@@ -131,7 +131,7 @@ TEST_F(Certify, RefusesWhatItCannotProve)
 }
 
 /// logit = |x_first - middle| + |x_second - middle'| of a state, which must lie in `domain`.
-Model diamond(std::string system, std::vector<Interval> domain, std::size_t first,
+Model diamond(std::string system, std::vector<ValueRange> domain, std::size_t first,
               std::size_t second)
 {
     Model out;
@@ -139,7 +139,7 @@ Model diamond(std::string system, std::vector<Interval> domain, std::size_t firs
     out.system = std::move(system);
     out.recipe = "state";
     out.scale.assign(n, 1);
-    for (const Interval& range : domain) out.offset.push_back(0.5 * (range.lower + range.upper));
+    for (const ValueRange& range : domain) out.offset.push_back(0.5 * (range.lower + range.upper));
     out.domain = std::move(domain);
     DenseLayer fold{.inputs = n, .outputs = 4, .weight = std::vector<double>(4 * n), .bias = {}};
     fold.weight[first] = fold.weight[2 * n + second] = 1;
@@ -189,7 +189,7 @@ TEST_F(Certify, ProvesAModelOfTheArm)
     // Close around the start, where eight obstacles leave some room.
     const nlohmann::json still =
         json({"simulate", "arm", "--set", "obstacles=8", "--t-end", "1e-9", "--json"});
-    std::vector<Interval> box;
+    std::vector<ValueRange> box;
     for (const auto& q : still["state"]) {
         const double half = box.size() < 4 ? 0.005 : 0.1;
         box.push_back({q.get<double>() - half, q.get<double>() + half});

@@ -34,6 +34,22 @@ static size_t count_of(rc_simulation* simulation, int32_t kind)
     return count;
 }
 
+GUARD(height_above_1, x[1] - 1)
+
+static void a_ball_that_begins_at_rest_at_a_height_says_that_it_fell(void)
+{
+    static const double at_rest[4] = {0, 1, 1, 0};
+    struct machine machine = thrown(4);
+    rc_options options = options_of(&machine, RC_DOPRI5);
+    rc_simulation* simulation;
+    machine.guard = height_above_1;
+    simulation = simulation_of(&machine, at_rest, &options);
+    CHECK_STATUS(RC_OK, rc_run(simulation));
+    CHECK(statistics_of(simulation).armed_beyond == 1);
+    CHECK(strstr(rc_describe(simulation), "guard 0 began on its surface and moved on beyond it"));
+    rc_simulation_free(simulation);
+}
+
 static void a_run_that_continues_from_a_rest_is_held_again(void)
 {
     static const int32_t methods[] = {RC_DOPRI5, RC_FEHLBERG78};
@@ -69,7 +85,7 @@ static void a_run_that_begins_at_rest_says_why_it_moves_on(void)
     CHECK(rc_state(simulation)[1] < -1);
     CHECK(strstr(rc_describe(simulation),
                  "guard 0 began on its surface and moved on beyond it, "
-                 "which is no event (`continues` holds again"));
+                 "which is no event (unilateral and at_start give it one"));
     CHECK(!strstr(rc_describe(simulation), "began beyond"));
     rc_simulation_free(simulation);
 }
@@ -139,6 +155,7 @@ int main(void)
 {
     a_run_that_continues_from_a_rest_is_held_again();
     a_run_that_begins_at_rest_says_why_it_moves_on();
+    a_ball_that_begins_at_rest_at_a_height_says_that_it_fell();
     a_restart_of_a_rest_is_held_unless_it_moves_what_is_held();
     a_veto_sets_the_ball_free();
     a_run_that_is_saved_after_a_release_is_the_same_run();

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -21,6 +22,7 @@ namespace {
 
 using Two = std::array<double, 2>;
 constexpr double epsilon = std::numeric_limits<double>::epsilon();
+constexpr double pi = std::numbers::pi;
 constexpr double never = std::numeric_limits<double>::infinity();
 
 /// x' = v, v' = -x: guards record the zeros of x and of v, and one reflects at x = -0.9.
@@ -215,6 +217,115 @@ TEST(Driving, ARestartChoosesTheModeAndLeavesATimeEventThereInThePast)
     EXPECT_EQ(run.mode, 0U);
     EXPECT_NEAR(run.x[0], 2.5, 1e-14);
     EXPECT_EQ(run.x[1], 6);
+}
+
+/// x' = 1; a timer is due when x[1] is reached, and sets itself a second further. A guard records
+/// the whole and half seconds.
+struct Timer {
+    using State = Two;
+    void flow(double /*t*/, const State& /*x*/, State& dxdt) const { dxdt = {1, 0}; }
+    [[nodiscard]] double guard(double t, const State& /*x*/) const { return std::sin(2 * pi * t); }
+    [[nodiscard]] GuardInfo guard_info() const
+    {
+        return {.crossing = Crossing::either, .resets = false};
+    }
+    void reset(double /*t*/, State& /*x*/) const {}
+    [[nodiscard]] double next_time_event(double /*t*/, const State& x) const { return x[1]; }
+    void time_reset(double /*t*/, State& x) const { x[1] += 1; }
+};
+
+TEST(Driving, AnEventAtARestartIsShownAndFollowsThoseBefore)
+{
+    const Timer system{};
+    const FixedStep<Rk4> coarse{};
+    // The first step ends at 4 and holds guard events behind the restart inside it.
+    for (const bool records : {true, false}) {
+        const Options options{.t_end = 4, .step = 4, .event_states = records};
+        Simulation simulation(system, Two{0, 10}, options, coarse);
+        const double restart = records ? 2.25 : 0.25;
+        while (records && simulation.t() < 2) ASSERT_TRUE(simulation.advance());
+        simulation.restart(restart, Two{7, restart});
+        ASSERT_TRUE(simulation.advance());
+        EXPECT_EQ(simulation.t(), restart);
+        EXPECT_EQ(simulation.x(), (Two{7, restart + 1}));
+        ASSERT_TRUE(simulation.advance());
+        EXPECT_GT(simulation.t(), restart);
+        const auto run = simulation.take();
+        double last = -1;
+        std::size_t timers = 0;
+        for (const auto& event : run.events) {
+            EXPECT_GE(event.t, last);
+            last = event.t;
+            timers += event.kind == EventKind::time_event ? 1 : 0;
+        }
+        EXPECT_EQ(timers, records ? 2U : 4U);
+        EXPECT_EQ(run.statistics.events, run.events.size());
+    }
+}
+
+TEST(Driving, AnObserverSeesTheEventsAtTheStartAndAtARestart)
+{
+    struct Doses {
+        using State = Two;
+        Times time_events{0, 1, 1, 3};
+        void flow(double /*t*/, const State& /*x*/, State& dxdt) const { dxdt = {0, 0}; }
+        void time_reset(double /*t*/, State& x) const { x[0] += 1; }
+    };
+    std::vector<double> seen;
+    const auto note = [&](const Event<Two>& event) { seen.push_back(event.t); };
+    Simulation whole(Doses{}, Two{0, 0}, {.t_end = 3});
+    whole.run_to_end(note);
+    EXPECT_EQ(seen, (std::vector<double>{0, 1, 1, 3}));
+
+    // What `advance` and `step` have shown is not shown again.
+    seen.clear();
+    Simulation advanced(Doses{}, Two{0, 0}, {.t_end = 3});
+    ASSERT_TRUE(advanced.advance());
+    advanced.run_to_end(note);
+    EXPECT_EQ(seen, (std::vector<double>{1, 1, 3}));
+    seen.clear();
+    Simulation stepped(Doses{}, Two{0, 0}, {.t_end = 3});
+    ASSERT_TRUE(stepped.step());
+    EXPECT_EQ(stepped.t(), 1);
+    stepped.run_to_end(note);
+    EXPECT_EQ(seen, (std::vector<double>{3}));
+
+    seen.clear();
+    Simulation restarted(Timer{}, Two{0, 10}, {.t_end = 1.3});
+    restarted.restart(0.25, Two{0, 0.25});
+    restarted.run_to_end([&](const Event<Two>& event) {
+        if (event.kind == EventKind::time_event) seen.push_back(event.t);
+    });
+    EXPECT_EQ(seen, (std::vector<double>{0.25, 1.25}));
+
+    // An observer that throws has seen its event; the next call goes on behind it.
+    seen.clear();
+    Simulation thrown(Doses{}, Two{0, 0}, {.t_end = 3});
+    const auto throws_at_zero = [&](const Event<Two>& event) {
+        note(event);
+        if (event.t == 0) throw std::runtime_error("not this one");
+    };
+    EXPECT_THROW(thrown.run_to_end(throws_at_zero), std::runtime_error);
+    thrown.run_to_end(throws_at_zero);
+    EXPECT_EQ(seen, (std::vector<double>{0, 1, 1, 3}));
+}
+
+TEST(Driving, ARestartThatIsRefusedLeavesNoEventOfIt)
+{
+    struct Refuses : Timer {
+        void time_reset(double t, State& x) const
+        {
+            if (x[0] < 0) throw std::runtime_error("no");
+            Timer::time_reset(t, x);
+            x[0] = x[0] == 5 ? -1 : x[0];
+            x[1] = x[0] == -1 ? t : x[1];
+        }
+    };
+    Simulation simulation(Refuses{}, Two{0, 10}, {.t_end = 4});
+    const std::size_t before = simulation.run().events.size();
+    EXPECT_THROW(simulation.restart(0.25, Two{5, 0.25}), std::runtime_error);
+    EXPECT_EQ(simulation.run().events.size(), before);
+    EXPECT_EQ(simulation.run().statistics.events, before);
 }
 
 TEST(Driving, ARunThatHasEndedRestarts)

@@ -227,8 +227,8 @@ TEST(Held, ARunThatBeginsAtRestSaysWhyItMovesOnAndWhatHoldsIt)
     EXPECT_EQ(
         describe(falls),
         "the end time was reached; guard 0 began on its surface and moved on beyond it, which "
-        "is no event (`continues` holds again what was at rest, unilateral and at_start "
-        "give it one)");
+        "is no event (unilateral and at_start give it one; a start from what a run has left at "
+        "rest is held again by `continues`)");
     // What the sentence says is so.
     EXPECT_EQ(again(Thrown{}, true).x[1], 0);
     EXPECT_EQ(describe(again(Thrown{}, true)), describe(Outcome::reached_end));
@@ -250,6 +250,47 @@ TEST(Held, ARunThatBeginsAtRestSaysWhyItMovesOnAndWhatHoldsIt)
     EXPECT_EQ(describe(beyond),
               "the end time was reached; guard 0 began beyond its surface, and waited until it had "
               "returned (at_start and at_entry let it fire there)");
+}
+
+TEST(Held, ABallThatBeginsAtRestAtAnyHeightSaysThatItFell)
+{
+    // At a height other than zero the rounding of x - h hides for the first steps where it heads.
+    const auto check = [](double height, const auto& stepping) {
+        const Thrown ball{.floor = height};
+        const Options options{
+            .t_end = 4,
+            .step = std::is_same_v<decltype(stepping), const FixedStep<Rk4>&> ? 0.01 : 0};
+        const auto run = integrate(ball, {0, height, 1, 0}, options, stepping);
+        EXPECT_NEAR(run.x[1], height - 80, 1e-9 * (80 + std::fabs(height)));
+        EXPECT_EQ(run.armed_beyond, std::vector<std::size_t>{0}) << height;
+        EXPECT_EQ(run.armed_on_surface, std::vector<std::size_t>{0}) << height;
+        EXPECT_EQ(run.statistics.armed_beyond, 1U) << height;
+        EXPECT_NE(describe(run).find("began on its surface and moved on"), std::string::npos);
+    };
+    for (const double height : {0.0, 0.5, 1.0, -1.0, 3.0, 1000.0, 0.001, 1e8}) {
+        check(height, ErrorControlled<Dopri5>{});
+        check(height, ErrorControlled<Taylor>{});
+        check(height, FixedStep<Rk4>{});
+        // One that stays where it is, rises, or has an event there, has nothing to say.
+        const Thrown ball{.floor = height};
+        EXPECT_EQ(integrate(ball, {0, height, 1, 2}, {.t_end = 0.1}).statistics.armed_beyond, 0U);
+        struct Stands : Thrown {
+            void flow(double t, const State& x, State& dxdt) const
+            {
+                dxdt = {x[2], x[3], 0, t < 2 ? 0.0 : 10.0};
+            }
+        };
+        Stands stands;
+        stands.floor = height;
+        EXPECT_EQ(integrate(stands, {0, height, 1, 0}, {.t_end = 1}).statistics.armed_beyond, 0U);
+        EXPECT_EQ(integrate(stands, {0, height, 1, 0}, {.t_end = 3}).statistics.armed_beyond, 0U);
+    }
+    Simulation simulation(Thrown{.floor = 1}, {0, 1.1, 1, 0}, {.t_end = 4});
+    while (simulation.t() < 1.5) ASSERT_TRUE(simulation.step());
+    simulation.restart(1, {1, 1, 1, -0.0}, 0);
+    const auto held = simulation.take();  // a restart holds again what is at rest
+    EXPECT_EQ(held.x[1], 1);
+    EXPECT_EQ(held.statistics.armed_beyond, 0U);
 }
 
 TEST(Held, ARunThatIsSavedAfterAReleaseIsTheSameRun)

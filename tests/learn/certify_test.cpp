@@ -101,7 +101,7 @@ RandomBox random_box(std::size_t n, Random& random)
     return box;
 }
 
-Interval bounds_of(const NetworkBounds& bounds, const RandomBox& box)
+ValueRange bounds_of(const NetworkBounds& bounds, const RandomBox& box)
 {
     NetworkBounds::Scratch scratch(bounds);
     std::array<double, NetworkBounds::max_inputs> influence{};
@@ -119,7 +119,7 @@ TEST(NetworkBounds, HoldsEverySampledLogitExactAndComputed)
             const Classifier classifier(model);
             for (int k = 0; k < 60; ++k) {
                 const RandomBox box = random_box(inputs, random);
-                const Interval range = bounds_of(bounds, box);
+                const ValueRange range = bounds_of(bounds, box);
                 for (int sample = 0; sample < 40; ++sample) {
                     std::vector<double> x(inputs);
                     for (std::size_t i = 0; i < inputs; ++i) {
@@ -155,7 +155,7 @@ TEST(NetworkBounds, OfOnePointAreAsTightAsTheRoundingOfItsEvaluation)
         for (int k = 0; k < 100; ++k) {
             RandomBox box = random_box(3, random);
             box.upper = box.lower;
-            const Interval range = bounds_of(bounds, box);
+            const ValueRange range = bounds_of(bounds, box);
             EXPECT_LE(range.upper - range.lower, 2 * allowed);
             EXPECT_GT(range.upper - range.lower, 0);
         }
@@ -179,7 +179,7 @@ TEST(NetworkBounds, AreOutwardWhereThereIsNothingButRounding)
             high[i] = rises ? box.upper[i] : box.lower[i];
             size += std::fabs(model.layers[0].weight[i]) * 3;  // |x| <= (1 + 0.5) 2
         }
-        const Interval range = bounds_of(bounds, box);
+        const ValueRange range = bounds_of(bounds, box);
         const auto lowest = static_cast<double>(exact_logit(model, low));
         const auto highest = static_cast<double>(exact_logit(model, high));
         ASSERT_LE(range.lower, lowest);
@@ -210,7 +210,7 @@ TEST(NetworkBounds, OfPartsAreInsideThoseOfTheWholeUpToTheRelaxation)
                 high = std::max(high, z);
             }
         }
-        const Interval range = bounds_of(bounds, box);
+        const ValueRange range = bounds_of(bounds, box);
         // Slopes are at most some 30 here, and a bend changes the range by a fraction of that.
         EXPECT_GE(range.lower, low - 30 * 0x1p-12);
         EXPECT_LE(range.upper, high + 30 * 0x1p-12);

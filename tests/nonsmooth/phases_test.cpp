@@ -574,7 +574,7 @@ TEST(Phases, ASimulationListsThemAsTheyBegin)
 {
     const Slider<3> system{.f = fall, .own = {elastic_floor()}};
     const auto simulation = held_block(system);
-    const std::vector<Phase>& phases = simulation->run().phases;
+    const std::vector<MotionPhase>& phases = simulation->run().phases;
     ASSERT_EQ(phases.size(), 2U);
     EXPECT_NEAR(phases[1].from, 1, tolerance);
     EXPECT_EQ(phases[1].cause, PhaseCause::held);

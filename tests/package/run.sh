@@ -13,6 +13,9 @@ cmake --install "$build" --prefix "$work/core" --component core >/dev/null
 cmake --install "$build" --prefix "$work/whole" >/dev/null
 export CMAKE_BUILD_PARALLEL_LEVEL=2
 
+# Optimised, g++ warns of more.
+build_type=Release
+
 # consume <compiler> <what it is> <options of the configuration> -- <programs>
 consume() {
     local compiler=$1 what=$2 options=()
@@ -25,7 +28,7 @@ consume() {
     local tree
     tree=$(mktemp -d "$work/tree.XXXX")
     cmake -G Ninja -S "$source/tests/package" -B "$tree" -DCMAKE_CXX_COMPILER="$compiler" \
-        -DCMAKE_BUILD_TYPE=None "${options[@]}" >/dev/null
+        -DCMAKE_BUILD_TYPE="$build_type" "${options[@]}" >/dev/null
     cmake --build "$tree" --target "$@" >"$work/log" 2>&1 || { cat "$work/log"; exit 1; }
     for program in "$@"; do "$tree/$program" >/dev/null; done
     echo "$(basename "$compiler"), $what: builds without warnings and runs"
@@ -35,6 +38,7 @@ for compiler in "$@"; do
     consume "$compiler" "the core" -DCMAKE_PREFIX_PATH="$work/core" -- consumer
 done
 last=${!#}
+build_type=None
 consume "$last" "all components" -DCMAKE_PREFIX_PATH="$work/whole" \
     -DRICOCHET_COMPONENTS="nonsmooth;sensitivity;scene;faults;learn;hosts" -- nonsmooth sensitivity scene faults learn
 consume "$last" "add_subdirectory" -DRICOCHET_SOURCE="$source" -- consumer

@@ -40,11 +40,20 @@ def test_a_run_that_begins_at_rest_says_why_it_moves_on():
     run = ricochet.integrate(thrown(), at_rest, 2.5, t_start=1.5)
     assert run.x[1] < -1 and run.statistics.armed_beyond == 1
     assert run.message.startswith("the end time was reached; began on their surface and moved on beyond "
-                                  "it, which is no event (continues holds again what was at rest")
+                                  "it, which is no event (unilateral and at_start give them one")
     assert pickle.loads(pickle.dumps(run)).message == run.message
     beyond = ricochet.integrate(thrown(), [1.5, -1.0, 1.0, 0.0], 2.5, t_start=1.5)
     assert "began beyond their surface" in beyond.message and "began on" not in beyond.message
     assert ricochet.integrate(thrown(unilateral=True), at_rest, 2.5, t_start=1.5).x[1] == 0
+
+
+@pytest.mark.parametrize("height", [0.0, 0.5, 1.0, -1.0, 1000.0])
+def test_a_ball_that_begins_at_rest_at_any_height_says_that_it_fell(height):
+    floor = Guard(lambda t, x: x[0] - height, reset=lambda t, x: [height, -0.5 * x[1]],
+                  rest=lambda t, x: [height, 0.0])
+    run = ricochet.integrate(System(lambda t, x: [x[1], -10.0], [floor]), [height, 0.0], 2.0)
+    assert abs(run.x[0] - height + 20) < 1e-9 and run.statistics.armed_beyond == 1
+    assert "began on their surface and moved on beyond it" in run.message
 
 
 def test_a_restart_of_a_rest_is_held_unless_it_moves_what_is_held():

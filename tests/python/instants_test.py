@@ -138,6 +138,25 @@ def test_a_restart_goes_on_from_another_state():
     assert abs(simulation.run_to_end().x[0] - math.sin(1)) < 1e-6
 
 
+def test_a_timer_that_is_due_at_a_restart_is_shown_there():
+    class Timer(ricochet.System):
+        def flow(self, t, x):
+            return [1.0, 0.0]
+
+        def next_time_event(self, t, x):
+            return x[1]
+
+        def time_reset(self, t, x):
+            return [x[0], x[1] + 1]
+
+    simulation = ricochet.Simulation(Timer(), [0.0, 10.0], 4.0)
+    simulation.restart(1.5, [7.0, 1.5])
+    assert simulation.advance() and simulation.t == 1.5
+    assert list(simulation.x) == [7.0, 2.5]
+    assert simulation.advance() and simulation.t == 2.5
+    assert [event.t for event in simulation.run_to_end().events] == [1.5, 2.5, 3.5]
+
+
 def test_a_restart_chooses_a_mode_by_its_name():
     class Motor(ricochet.System):
         modes = ["up", "down"]

@@ -73,7 +73,7 @@ public:
     /// -inf, inf or NaN if the arithmetic of the bound overflows; NaN is no bound.
     /// @param influence  written, one per input: a rough measure of how much the logit can
     ///                   change along this edge of the box, for choosing where to cut; no bound
-    [[nodiscard]] Interval over(const double* lower, const double* upper, double enough,
+    [[nodiscard]] ValueRange over(const double* lower, const double* upper, double enough,
                                 Scratch& scratch, double* influence) const noexcept;
 
 private:
@@ -94,8 +94,8 @@ private:
     void bound_evaluation(const Model& model);
     [[nodiscard]] Place place(const double* lower, const double* upper) const noexcept;
     template <std::size_t D>
-    [[nodiscard]] Interval forward(const Place& at, Scratch& s, double* influence) const noexcept;
-    [[nodiscard]] Interval forward(const Place& at, Scratch& s, double* influence) const noexcept;
+    [[nodiscard]] ValueRange forward(const Place& at, Scratch& s, double* influence) const noexcept;
+    [[nodiscard]] ValueRange forward(const Place& at, Scratch& s, double* influence) const noexcept;
     [[nodiscard]] double backward(const Place& at, Scratch& s) const noexcept;
 
     std::size_t inputs_ = 0;

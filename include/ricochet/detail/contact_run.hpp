@@ -49,7 +49,7 @@ public:
 
     [[nodiscard]] virtual AnyLoop<C>& loop() noexcept = 0;
     [[nodiscard]] virtual const AnyLoop<C>& loop() const noexcept = 0;
-    [[nodiscard]] virtual const std::vector<Phase>& phases() const noexcept = 0;
+    [[nodiscard]] virtual const std::vector<MotionPhase>& phases() const noexcept = 0;
     /// The counts of the run, by the kind of phase.
     [[nodiscard]] virtual ContactStatistics statistics(const Statistics& run, double t) const = 0;
     [[nodiscard]] virtual const ContactReport& failure() const noexcept = 0;

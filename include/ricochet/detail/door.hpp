@@ -60,7 +60,7 @@ template <class X>
         return x;
     } else {
         if (x.size() == 0) return X{};  // unknown, or not recorded
-        X out = like;
+        X out = x.size() == static_cast<std::size_t>(like.size()) ? like : X{};
         copy_state(x, out);
         return out;
     }

@@ -66,7 +66,7 @@ struct RICOCHET_ALIGNED HandOverRun {
     SetValuedState<System> state;  ///< at the time reached, with its reaction
     Mode mode = 0;                 ///< `BranchModes::several` in a set-valued phase
     std::vector<Event<Vector>> events;
-    std::vector<Phase> phases;
+    std::vector<MotionPhase> phases;
     Trajectory<Vector> trajectory;  ///< at the sample times
     HandOverStatistics statistics;
     StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed

@@ -72,7 +72,7 @@ public:
 struct PhasedCounts {
     const Statistics& all;
     const SetValuedStatistics& implicit;
-    const std::vector<Phase>& phases;
+    const std::vector<MotionPhase>& phases;
     double t_end;  ///< [s] of the run
 };
 [[nodiscard]] HandOverStatistics statistics_by_phase(const PhasedCounts& of);

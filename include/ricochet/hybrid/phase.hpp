@@ -26,7 +26,7 @@ enum class PhaseCause {
 [[nodiscard]] std::string_view name(PhaseCause cause) noexcept;
 
 /// Start of a phase, until the next one or the end of the run.
-struct Phase {
+struct MotionPhase {
     double from = 0;  ///< [s]
     bool set_valued = false;
     PhaseCause cause = PhaseCause::start;

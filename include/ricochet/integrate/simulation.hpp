@@ -457,8 +457,9 @@ public:
         return goes_on;
     }
 
-    /// Advances to the end. Calls `observe(event)` for every recorded event and
-    /// `observe(simulation)` after every step, each if `observe` accepts it. Both
+    /// Advances to the end. Calls `observe(event)` for every recorded event that `advance` and
+    /// `step` have not shown, those at the start included, and `observe(simulation)` after every
+    /// step, each if `observe` accepts it. Both
     /// see only final results: with the second, no detector looks ahead.
     template <class Observer>
     void run_to_end(Observer&& observe)
@@ -468,14 +469,19 @@ public:
             observe(std::as_const(*this));
         };
         const auto& events = loop_->run().events;
-        std::size_t seen = events.size();
+        std::size_t seen = loop_->shown_events();
         loop_->show_all();
+        const auto show_new = [&] {
+            if constexpr (requires(const Event<X>& event) { observe(event); }) {
+                if (seen < events.size()) loop_->show_all();
+                while (seen < events.size()) show(events[seen++], observe);
+            }
+        };
+        show_new();
         while (!ended()) {
             loop_->advance_once(!watches_steps);
             refresh();
-            if constexpr (requires(const Event<X>& event) { observe(event); }) {
-                for (; seen < events.size(); ++seen) show(events[seen], observe);
-            }
+            show_new();
             if constexpr (watches_steps) observe(std::as_const(*this));
         }
         loop_->show_all();
@@ -503,11 +509,11 @@ public:
     }
 
     /// Goes on from (t, x) in a mode, as from a start: guards are armed and the first step is
-    /// estimated again. An event of `Times` or `next_time_event(t)` at t belongs to the past; a
-    /// timer of `next_time_event(t, x)` that is due there has its event. For interventions and
-    /// co-simulation: t may be any time from t_start to before t_end, also one that `advance` has
-    /// stopped at inside a step; what was recorded after it is dropped. A run that has ended goes
-    /// on, unless its result was taken.
+    /// estimated again, and `advance` shows first what happens there. An event of `Times` or
+    /// `next_time_event(t)` at t belongs to the past; a timer of `next_time_event(t, x)` that is
+    /// due there has its event. For interventions and co-simulation: t may be any time from t_start
+    /// to before t_end, also one that `advance` has stopped at inside a step; what was recorded
+    /// after it is dropped. A run that has ended goes on, unless its result was taken.
     ///
     /// @throws std::invalid_argument if t lies outside of the run, or `integrate` would refuse such
     /// a start; then nothing has changed.

@@ -279,7 +279,7 @@ struct GateSamples {
     std::vector<double> weight;    ///< number of states of the runs that the row represents
     std::uint64_t events = 0;      ///< number of events of the runs
     std::uint64_t steps = 0;
-    std::vector<Interval> box;  ///< box of all states of the runs
+    std::vector<ValueRange> box;  ///< box of all states of the runs
 
     [[nodiscard]] std::size_t size() const noexcept { return event.size(); }
     /// Features of state i.

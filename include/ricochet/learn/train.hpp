@@ -274,7 +274,7 @@ public:
     [[nodiscard]] std::size_t size() const noexcept { return points_.size(); }
     void visit(const X& x)
     {
-        if (box_.empty()) box_.assign(static_cast<std::size_t>(x.size()), Interval{x[0], x[0]});
+        if (box_.empty()) box_.assign(static_cast<std::size_t>(x.size()), ValueRange{x[0], x[0]});
         for (std::size_t i = 0; i < box_.size(); ++i) {
             const double component = x[static_cast<decltype(x.size())>(i)];
             if (first_) box_[i] = {component, component};
@@ -285,14 +285,14 @@ public:
     }
     void widen(double share)
     {
-        for (Interval& side : box_) {
+        for (ValueRange& side : box_) {
             const double width = side.upper - side.lower;
             side.lower -= share * width;
             side.upper += share * width;
         }
     }
-    [[nodiscard]] const std::vector<Interval>& box() const noexcept { return box_; }
-    void set_box(const std::vector<Interval>& box) { box_ = box; }
+    [[nodiscard]] const std::vector<ValueRange>& box() const noexcept { return box_; }
+    void set_box(const std::vector<ValueRange>& box) { box_ = box; }
 
     // --- the interface `SurfaceProblem` ---
 
@@ -356,7 +356,7 @@ private:
     double step_;
     Asked* asked_;
     std::vector<State> points_;
-    std::vector<Interval> box_;
+    std::vector<ValueRange> box_;
     bool first_ = true;
 };
 

@@ -37,7 +37,7 @@ concept Contacting = requires
 /// the mechanism's own guards, whose numbers follow those of the contacts; x = (q, v).
 template <Contacting System>
 struct ContactRun : Run<typename FreeFlight<System>::State> {
-    std::vector<Phase> phases;
+    std::vector<MotionPhase> phases;
     std::vector<ContactForces> forces;  ///< at the sample times, of the steps that hold them
     ContactStatistics statistics;       ///< in place of the counts of all steps together
     ContactReport failure;  ///< set with `not_converged`, and with `non_finite` in contact
@@ -130,7 +130,7 @@ public:
     [[nodiscard]] Vector v() const { return Flight::velocity(this->x()); }
     /// Mean forces over the last step; zero in flight.
     [[nodiscard]] ContactForces forces() const { return contacts().forces(); }
-    [[nodiscard]] const std::vector<Phase>& phases() const noexcept { return contacts().phases(); }
+    [[nodiscard]] const std::vector<MotionPhase>& phases() const noexcept { return contacts().phases(); }
     [[nodiscard]] bool in_contact() const noexcept { return phases().back().set_valued; }
     [[nodiscard]] ContactStatistics statistics() const
     {

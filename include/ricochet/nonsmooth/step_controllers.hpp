@@ -273,7 +273,7 @@ public:
     void include(const StepRanges& other) noexcept;
     [[nodiscard]] bool empty() const noexcept { return !(lower_[0] <= upper_[0]); }
     /// One interval per input, widened by this fraction of its width on both sides.
-    [[nodiscard]] std::vector<Interval> domain(double margin) const;
+    [[nodiscard]] std::vector<ValueRange> domain(double margin) const;
 
 private:
     Inputs lower_ = filled(1);

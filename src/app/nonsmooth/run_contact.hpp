@@ -65,7 +65,7 @@ template <class System, class Vector>
     out.run.statistics = run.statistics.event_driven;
     out.run.statistics.events = run.events.size();
     if (run.statistics.to_contact > 0) out.steps = detail::shown(run.statistics.time_stepping);
-    for (const Phase& phase : run.phases) {
+    for (const MotionPhase& phase : run.phases) {
         out.phases.push_back({phase.from, phase.set_valued, name(phase.cause)});
     }
     return out;

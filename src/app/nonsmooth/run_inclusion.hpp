@@ -79,7 +79,7 @@ template <class System>
     out.run.statistics = run.statistics.event_driven;
     out.run.statistics.events = run.events.size();
     if (run.statistics.to_set_valued > 0) out.steps = shown(run.statistics.set_valued);
-    for (const Phase& phase : run.phases) {
+    for (const MotionPhase& phase : run.phases) {
         out.phases.push_back({phase.from, phase.set_valued, name(phase.cause)});
     }
     return out;

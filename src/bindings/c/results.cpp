@@ -40,7 +40,7 @@ void write_event(rc_event* event, const ShownEvent& from)
                  "rc_event");
 }
 
-void write_phase(rc_phase* phase, const Phase& from)
+void write_phase(rc_phase* phase, const MotionPhase& from)
 {
     write_struct(phase,
                  {.size = sizeof *phase,

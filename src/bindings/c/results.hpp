@@ -48,7 +48,7 @@ struct Counts {
 
 // All of these throw Refusal if the struct is invalid.
 void write_event(rc_event* event, const ShownEvent& from);
-void write_phase(rc_phase* phase, const Phase& from);
+void write_phase(rc_phase* phase, const MotionPhase& from);
 void write_statistics(rc_statistics* statistics, const Counts& from);
 void write_failure(rc_callback_error* error, const CallbackFailed& from);
 

@@ -46,7 +46,7 @@ public:
     [[nodiscard]] virtual bool keeps_steps() const noexcept = 0;
     virtual void solution(double t, bool before, double* x) const = 0;
     [[nodiscard]] virtual Mode solution_mode(double t) const = 0;
-    [[nodiscard]] virtual const std::vector<Phase>& phases() const noexcept = 0;
+    [[nodiscard]] virtual const std::vector<MotionPhase>& phases() const noexcept = 0;
     /// At the present time, until it is asked again.
     [[nodiscard]] virtual const std::vector<double>& reaction() = 0;
     /// One for each sample; none without set-valued motion.

@@ -95,7 +95,7 @@ public:
     {
         return loop_->run().solution.mode(t);
     }
-    [[nodiscard]] const std::vector<Phase>& phases() const noexcept override
+    [[nodiscard]] const std::vector<MotionPhase>& phases() const noexcept override
     {
         return loop_->run().phases;
     }

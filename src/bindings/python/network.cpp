@@ -84,11 +84,11 @@ private:
     py::ssize_t count_ = 0;
 };
 
-[[nodiscard]] py::array pairs(const std::vector<Interval>& intervals)
+[[nodiscard]] py::array pairs(const std::vector<ValueRange>& intervals)
 {
     py::array out = new_array<double>({static_cast<py::ssize_t>(intervals.size()), 2});
     auto* to = static_cast<double*>(out.mutable_data());
-    for (const Interval& interval : intervals) {
+    for (const ValueRange& interval : intervals) {
         *to++ = interval.lower;
         *to++ = interval.upper;
     }

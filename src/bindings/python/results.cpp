@@ -130,20 +130,20 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     return out;
 }
 
-[[nodiscard]] py::list listed(const std::vector<Phase>& phases)
+[[nodiscard]] py::list listed(const std::vector<MotionPhase>& phases)
 {
     py::list out;
-    for (const Phase& phase : phases) {
+    for (const MotionPhase& phase : phases) {
         const std::string cause(name(phase.cause));
         out.append(py::make_tuple(phase.from, phase.set_valued, cause));
     }
     return out;
 }
 
-[[nodiscard]] py::list pickled(const std::vector<Phase>& phases)
+[[nodiscard]] py::list pickled(const std::vector<MotionPhase>& phases)
 {
     py::list out;
-    for (const Phase& phase : phases) {
+    for (const MotionPhase& phase : phases) {
         out.append(py::make_tuple(phase.from, phase.set_valued, static_cast<int>(phase.cause)));
     }
     return out;
@@ -353,8 +353,8 @@ void bind_results(py::module_& module)
                     "and at_entry let them fire there): ");
                 add(true,
                     "; began on their surface and moved on beyond it, which is no event "
-                    "(continues holds again what was at rest, unilateral and at_start give them "
-                    "one): ");
+                    "(unilateral and at_start give them one; a start from what a run has left at "
+                    "rest is held again by continues): ");
                 const std::string more = describe(self.record.statistics, self.guard_names);
                 return more.empty() ? out : out + "; " + more;
             },
