@@ -378,9 +378,10 @@ private:
                                           const std::vector<double>& x)
     {
         return std::any_of(level.unproved.begin(), level.unproved.end(), [&](const auto& box) {
-            return std::equal(x.begin(), x.end(), box.begin(), [](double value, const ValueRange& r) {
-                return value >= r.lower && value <= r.upper;
-            });
+            return std::equal(x.begin(), x.end(), box.begin(),
+                              [](double value, const ValueRange& r) {
+                                  return value >= r.lower && value <= r.upper;
+                              });
         });
     }
 

@@ -312,7 +312,7 @@ double NetworkBounds::backward(const Place& at, Scratch& s) const noexcept
 }
 
 ValueRange NetworkBounds::over(const double* lower, const double* upper, double enough,
-                             Scratch& scratch, double* influence) const noexcept
+                               Scratch& scratch, double* influence) const noexcept
 {
     const Place at = place(lower, upper);
     ValueRange range = forward(at, scratch, influence);

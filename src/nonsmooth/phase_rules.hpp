@@ -385,7 +385,7 @@ private:
     mutable std::vector<double> observed_;
     std::vector<ReactionChange> changes_;
     std::vector<BranchChange> branch_changes_;  ///< of an inclusion alone
-    std::vector<MotionPhase> first_phases_;           ///< until the list is moved
+    std::vector<MotionPhase> first_phases_;     ///< until the list is moved
     std::vector<MotionPhase>* phases_ = &first_phases_;
     Kind kind_ = own;                       ///< at the end of the last step
     bool begins_ = false;                   ///< no step has been taken since the start

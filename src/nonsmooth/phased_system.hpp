@@ -871,7 +871,9 @@ void PhasedSystem<C>::make_phases()
                 .reaction(kind_of(at.mode), {at.t0, at.x0.data(), at.s, at.t, at.x.data()}, r);
         };
     }
-    t.list_in = [](void* door, std::vector<MotionPhase>& phases) { at(door).rules_.list_in(phases); };
+    t.list_in = [](void* door, std::vector<MotionPhase>& phases) {
+        at(door).rules_.list_in(phases);
+    };
     t.complete = [](void* door, Run<C>& run) { at(door).complete(run); };
     t.save = [](void* door, std::vector<double>& memory) {
         const PhasedSystem& me = at(door);

@@ -256,7 +256,7 @@ TEST(Driving, AnEventAtARestartIsShownAndFollowsThoseBefore)
         for (const auto& event : run.events) {
             EXPECT_GE(event.t, last);
             last = event.t;
-            timers += event.kind == EventKind::time_event ? 1 : 0;
+            timers += event.kind == EventKind::time ? 1 : 0;
         }
         EXPECT_EQ(timers, records ? 2U : 4U);
         EXPECT_EQ(run.statistics.events, run.events.size());
@@ -294,7 +294,7 @@ TEST(Driving, AnObserverSeesTheEventsAtTheStartAndAtARestart)
     Simulation restarted(Timer{}, Two{0, 10}, {.t_end = 1.3});
     restarted.restart(0.25, Two{0, 0.25});
     restarted.run_to_end([&](const Event<Two>& event) {
-        if (event.kind == EventKind::time_event) seen.push_back(event.t);
+        if (event.kind == EventKind::time) seen.push_back(event.t);
     });
     EXPECT_EQ(seen, (std::vector<double>{0.25, 1.25}));
 

@@ -720,7 +720,7 @@ struct SetInMotion {
     using State = Array<3>;  // x, v, y
     std::size_t guard_count = 2;
     std::size_t mode_count = 2;
-    GuardInfo info;
+    GuardInfo info{};
     double push;
     bool by_tick, by_mode;
     Times time_events{by_tick ? 1.0 : 9.0};

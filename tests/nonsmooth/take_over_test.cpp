@@ -85,7 +85,9 @@ TEST(TakeOver, StickSlipIsGivenBackAtEverySlip)
     // The spring reaches 1 m after 5 s on the belt.
     EXPECT_NEAR(slips[0], 5, 1e-9);
     for (std::size_t i = 0; i < slips.size(); ++i) EXPECT_NEAR(slips[i], expected[i], 1e-7) << i;
-    const auto released = [](const MotionPhase& phase) { return phase.cause == PhaseCause::released; };
+    const auto released = [](const MotionPhase& phase) {
+        return phase.cause == PhaseCause::released;
+    };
     EXPECT_GE(std::count_if(run.phases.begin(), run.phases.end(), released), 3);
     EXPECT_NEAR(run.x[0], alone.state.w[0], 1e-6);
 }

@@ -154,7 +154,7 @@ def test_a_timer_that_is_due_at_a_restart_is_shown_there():
     assert simulation.advance() and simulation.t == 1.5
     assert list(simulation.x) == [7.0, 2.5]
     assert simulation.advance() and simulation.t == 2.5
-    assert [event.t for event in simulation.run_to_end().events] == [1.5, 2.5, 3.5]
+    assert list(simulation.run_to_end().events["t"]) == [1.5, 2.5, 3.5]
 
 
 def test_a_restart_chooses_a_mode_by_its_name():

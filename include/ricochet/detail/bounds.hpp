@@ -74,7 +74,7 @@ public:
     /// @param influence  written, one per input: a rough measure of how much the logit can
     ///                   change along this edge of the box, for choosing where to cut; no bound
     [[nodiscard]] ValueRange over(const double* lower, const double* upper, double enough,
-                                Scratch& scratch, double* influence) const noexcept;
+                                  Scratch& scratch, double* influence) const noexcept;
 
 private:
     struct Layer {

@@ -396,8 +396,8 @@ struct Run {
 
     // Of a system with set_valued() (nonsmooth/hand_over.hpp), else empty.
 
-    std::vector<MotionPhase> phases;       ///< where something is held, or followed by implicit steps
-    SetValuedStatistics set_valued;  ///< of the implicit steps alone
+    std::vector<MotionPhase> phases;  ///< where something is held, or followed by implicit steps
+    SetValuedStatistics set_valued;   ///< of the implicit steps alone
     StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
     /// The reactions at the end of a run that has ended by itself, after its events: empty where
     /// the mode has no inclusion, NaN where none follows from the state.

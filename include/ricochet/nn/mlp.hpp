@@ -242,10 +242,10 @@ private:
 
 /// One statement of a certificate.
 struct CertificateLevel {
-    double margin = 0;                              ///< in units of the guard
-    double threshold = 0;                           ///< threshold of the logit
-    std::uint64_t boxes = 0;                        ///< number of boxes examined
-    double seconds = 0;                             ///< [s] time that the proof took
+    double margin = 0;                                ///< in units of the guard
+    double threshold = 0;                             ///< threshold of the logit
+    std::uint64_t boxes = 0;                          ///< number of boxes examined
+    double seconds = 0;                               ///< [s] time that the proof took
     std::vector<std::vector<ValueRange>> unproved{};  ///< boxes that need the exact guard
 };
 
@@ -255,7 +255,7 @@ struct Certificate {
     std::string fingerprint;  ///< of the model
     std::string system;
     std::map<std::string, double> parameters;  ///< of the system
-    std::vector<ValueRange> box;                 ///< of raw features
+    std::vector<ValueRange> box;               ///< of raw features
     /// Margins increase, thresholds do not; the first threshold is that of the model.
     std::vector<CertificateLevel> levels;
 };

@@ -74,7 +74,7 @@ struct Model {
     std::string recipe;                        ///< e.g. "state"
     std::vector<double> offset;                ///< one per feature
     std::vector<double> scale;                 ///< one per feature, nonzero
-    std::vector<ValueRange> domain;              ///< one per raw feature
+    std::vector<ValueRange> domain;            ///< one per raw feature
     Activation activation = Activation::relu;
     Precision precision = Precision::f32;
     double threshold = 0;  ///< an event is predicted if the logit is not below it

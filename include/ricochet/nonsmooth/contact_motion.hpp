@@ -130,7 +130,10 @@ public:
     [[nodiscard]] Vector v() const { return Flight::velocity(this->x()); }
     /// Mean forces over the last step; zero in flight.
     [[nodiscard]] ContactForces forces() const { return contacts().forces(); }
-    [[nodiscard]] const std::vector<MotionPhase>& phases() const noexcept { return contacts().phases(); }
+    [[nodiscard]] const std::vector<MotionPhase>& phases() const noexcept
+    {
+        return contacts().phases();
+    }
     [[nodiscard]] bool in_contact() const noexcept { return phases().back().set_valued; }
     [[nodiscard]] ContactStatistics statistics() const
     {

@@ -50,7 +50,7 @@ struct Record {
     std::string reason;                         ///< text of the `Stop` that ended the run
     std::vector<std::size_t> armed_beyond;      ///< guards that began beyond their surface,
     std::vector<std::size_t> armed_on_surface;  ///< and those of them that began on it
-    std::vector<MotionPhase> phases;                  ///< of a system with set-valued motion
+    std::vector<MotionPhase> phases;            ///< of a system with set-valued motion
     std::vector<double> reaction;
     std::size_t reaction_width = 0;  ///< number of reactions in the widest row
     std::vector<double> reactions;   ///< row after row of that width, one for each of `times`
