@@ -13,7 +13,7 @@ void Loop<X, single>::restart(double t, const X& x, Mode mode)
     refuse_bad_restart(t, x, mode);
     if (is_tentative()) take_back();
     const auto recorded = static_cast<std::ptrdiff_t>(run_.events.size());
-    const std::uint64_t counted = run_.statistics.events;
+    const Statistics counted = run_.statistics;
     Snapshot old;
     visit_state(SnapshotWriter(old));
     std::vector<MotionPhase> phases = run_.phases;
@@ -25,11 +25,12 @@ void Loop<X, single>::restart(double t, const X& x, Mode mode)
         this->who_ = "integrate";
         visit_state(SnapshotReader(old));
         run_.events.erase(run_.events.begin() + recorded, run_.events.end());
+        run_.statistics = counted;
         run_.phases = std::move(phases);
         go_on_from_place();
         throw;
     }
-    show_from_restart(t, recorded, run_.statistics.events - counted);
+    show_from_restart(t, recorded, run_.statistics.events - counted.events);
     record_restart();
 }
 

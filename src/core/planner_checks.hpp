@@ -56,11 +56,12 @@ inline void Planner<X, single>::watch_sleeper(std::size_t i, Check now, Mode mod
 {
     if (wrong_ || !bank[i].enabled || never_sleeps(bank[i])) return;
     const Check from = last_check(i);
-    if (!(now.time > from.time)) return;
+    // A bound that stands for the guard at this time tells nothing of where it is.
+    if (from.exact && !(now.time > from.time)) return;
     now.value = value_at(i, now, mode, bank, counts);
     now.bound = bound(i, now, mode, bank[i].side);
     const double tau = now.time - from.time;
-    if (detector_->checks_bounds) check_bound(i, now, mode, bank);
+    if (detector_->checks_bounds || !from.exact) check_bound(i, now, mode, bank);
     if (wrong_) return;
     if (now.bound.distance < -band(bank, i, from.value, now.value)) {
         blame(i, from, now, (from.bound.speed + 0.5 * from.bound.acceleration * tau) * tau);

@@ -478,6 +478,21 @@ TEST(Planner, ALowerBoundAboveItsGuardIsNamed)
     }
 }
 
+TEST(Planner, AWrongLowerBoundAtTheEndOfTheRunIsNamed)
+{
+    // 1 - t, and 1/2 as its lower bound throughout: it covers the guard at the end of the run, too.
+    Plan plan(Floored{{{{[](double t) { return 1 - t; }, 1}}}, 0.5});
+    plan.overrun(1.25);
+    ASSERT_EQ(plan.close(), Planner::none);
+    ASSERT_EQ(plan.counts.guard_calls, 0u);
+    plan.step.accept();
+    plan.planner.check_last(plan.step, plan.bank, plan.counts);
+    ASSERT_TRUE(plan.planner.wrong());
+    EXPECT_TRUE(plan.planner.wrong()->lower_bound);
+    EXPECT_EQ(plan.planner.wrong()->value, -0.25);
+    EXPECT_EQ(plan.planner.wrong()->allowed, 0.5);
+}
+
 TEST(Planner, GoesOnFromTheNumbersOfItsChecks)
 {
     Plan plan(Clock{{resting(2, 4), resting(3, 1)}});

@@ -277,18 +277,18 @@ TEST(Driving, AnObserverSeesTheEventsAtTheStartAndAtARestart)
     whole.run_to_end(note);
     EXPECT_EQ(seen, (std::vector<double>{0, 1, 1, 3}));
 
-    // What `advance` and `step` have shown is not shown again.
+    // What `advance` has shown, or would not show any more, is not shown again.
     seen.clear();
     Simulation advanced(Doses{}, Two{0, 0}, {.t_end = 3});
     ASSERT_TRUE(advanced.advance());
     advanced.run_to_end(note);
     EXPECT_EQ(seen, (std::vector<double>{1, 1, 3}));
     seen.clear();
-    Simulation stepped(Doses{}, Two{0, 0}, {.t_end = 3});
+    Simulation stepped(Doses{}, Two{0, 0}, {.t_end = 3, .step = 2});
     ASSERT_TRUE(stepped.step());
     EXPECT_EQ(stepped.t(), 1);
     stepped.run_to_end(note);
-    EXPECT_EQ(seen, (std::vector<double>{3}));
+    EXPECT_EQ(seen, (std::vector<double>{1, 1, 3}));
 
     seen.clear();
     Simulation restarted(Timer{}, Two{0, 10}, {.t_end = 1.3});
