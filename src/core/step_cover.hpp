@@ -288,11 +288,14 @@ inline double StepCover<X, single>::place(const Task& task, const Node& lo, cons
     }
     if (from_clear) {
         if (detector_->closes(self_, lo.bound, hi.bound, width, band)) return nowhere;
-        const double from = lo.s + detector_->sure(self_, lo.bound, band);
-        const double to = hi.s - detector_->sure(self_, hi.bound, band);
+        const double behind = detector_->sure(self_, lo.bound, band);
+        const double ahead = detector_->sure(self_, hi.bound, band);
+        const double from = lo.s + behind;
+        const double to = hi.s - ahead;
         const double speed = (1 + detector_->margin) * std::max(lo.bound.speed, hi.bound.speed);
         if (!(to > from)) return lo.s + 0.5 * width;
-        if (to - from > resolution_.blur(task.step.time(hi.s)) && std::isfinite(speed)) {
+        const bool means = behind > 0 || ahead > 0;  // bounds that are none cover nothing
+        if (means && std::isfinite(speed) && to - from > resolution_.blur(task.step.time(hi.s))) {
             const double far = std::max(lo.bound.distance, hi.bound.distance);
             const double near = std::min(lo.bound.distance, hi.bound.distance);
             need += (to - from) * speed / (far + near);
@@ -318,8 +321,9 @@ inline double StepCover<X, single>::place_beside(const Task& task, const Node& c
     const double speed = (1 + detector_->margin) * std::max(clear.bound.speed, other.bound.speed);
     const double distance = clear.bound.distance;
     const double beyond = std::max(-other.bound.distance, 0.0);
-    const double open = std::fabs(width) - detector_->sure(self_, clear.bound, 0);
-    if (!(open > finest) || !std::isfinite(speed)) {
+    const double sure = detector_->sure(self_, clear.bound, 0);
+    const double open = std::fabs(width) - sure;
+    if (!(open > finest) || !(sure > 0) || !std::isfinite(speed)) {
         return std::numeric_limits<double>::quiet_NaN();
     }
     // The surface is expected on the line through both values.
