@@ -29,6 +29,11 @@ using State = std::array<double, 6>;
 /// steps.
 constexpr double of_motion = 1e-3;
 
+#ifndef RICOCHET_RANDOM_PHASES
+#define RICOCHET_RANDOM_PHASES 20
+#endif
+constexpr std::uint64_t seeds = RICOCHET_RANDOM_PHASES;
+
 template <int M>
 [[nodiscard]] Options options_of(const WithSawtooth<M>& system, double rtol = 1e-9)
 {
@@ -75,10 +80,8 @@ void expect_motion_of_inclusion(const State& x, double t, const RandomInclusion<
 
 /// Each step has an error of at most its tolerance, of which the motion makes at most ten times as
 /// much; a tenth of the tolerance leaves a fifth of it in steps of order two.
-template <int M>
-void expect_errors_of_steps(const Run<State>& run, const WithSawtooth<M>& system, const State& x0)
+void expect_errors_of_steps(const Run<State>& run, const State& x)
 {
-    const State x = integrate(system, x0, options_of(system, 1e-10)).x;
     const auto steps = static_cast<double>(run.statistics.steps);
     double size = 1;
     for (const double component : x) size = std::max(size, std::fabs(component));
@@ -87,16 +90,26 @@ void expect_errors_of_steps(const Run<State>& run, const WithSawtooth<M>& system
     }
 }
 
+/// Whether the run ended by itself, with a word about it.
+[[nodiscard]] bool gave_up(Outcome outcome)
+{
+    return outcome != Outcome::reached_end && outcome != Outcome::stopped_by_event;
+}
+
+/// Returns false if the run ended with a word about it.
 template <int M>
-void follow(const RandomInclusion<4>& full, std::uint64_t seed)
+[[nodiscard]] bool follow(const RandomInclusion<4>& full, std::uint64_t seed)
 {
     const auto system = WithSawtooth<M>::make(test::without_unused<M>(full), seed);
     State x0;
     for (std::size_t i = 0; i < 6; ++i) x0[i] = full.start[static_cast<Eigen::Index>(i)];
     const auto run = integrate(system, x0, options_of(system));
+    if (gave_up(run.outcome)) return false;
     expect_teeth(run, system);
     expect_motion_of_inclusion(run.x, run.t, system.inclusion);
-    expect_errors_of_steps(run, system, x0);
+    const auto finer = integrate(system, x0, options_of(system, 1e-10));
+    if (gave_up(finer.outcome)) return false;
+    expect_errors_of_steps(run, finer.x);
 
     Simulation stepped(system, x0, options_of(system));
     for (int k = 1; stepped.step(); ++k) {
@@ -105,6 +118,17 @@ void follow(const RandomInclusion<4>& full, std::uint64_t seed)
     const auto again = stepped.finish();
     EXPECT_EQ(again.t, run.t);
     EXPECT_EQ(again.x, run.x);
+    return true;
+}
+
+[[nodiscard]] bool follow(const RandomInclusion<4>& full, std::uint64_t seed)
+{
+    switch (full.reactions) {
+        case 1: return follow<1>(full, seed);
+        case 2: return follow<2>(full, seed);
+        case 3: return follow<3>(full, seed);
+        default: return follow<4>(full, seed);
+    }
 }
 
 class RandomPhases : public testing::TestWithParam<std::size_t> {};
@@ -112,16 +136,12 @@ class RandomPhases : public testing::TestWithParam<std::size_t> {};
 TEST_P(RandomPhases, EventsBesideAnInclusionComeWhenTheyHaveTo)
 {
     const auto family = static_cast<InclusionFamily>(GetParam());
-    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    std::vector<std::uint64_t> reported;
+    for (std::uint64_t seed = 0; seed < seeds; ++seed) {
         SCOPED_TRACE(testing::Message() << "seed " << seed);
-        const auto full = random_inclusion<4>(family, seed);
-        switch (full.reactions) {
-            case 1: follow<1>(full, seed); break;
-            case 2: follow<2>(full, seed); break;
-            case 3: follow<3>(full, seed); break;
-            default: follow<4>(full, seed);
-        }
+        if (!follow(random_inclusion<4>(family, seed), seed)) reported.push_back(seed);
     }
+    EXPECT_LE(reported.size(), seeds / 1000) << testing::PrintToString(reported);
 }
 
 INSTANTIATE_TEST_SUITE_P(Families, RandomPhases,
