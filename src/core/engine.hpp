@@ -817,6 +817,11 @@ protected:
         bank_[i].armed_on = on_surface;
     }
 
+    /// Whether guard i has an event recorded at t.
+    [[nodiscard]] bool has_event_at(std::size_t i, double t) const;
+    /// Counts guards that were armed beyond their surfaces, and are not there any more, no longer.
+    void forget_armed_beyond();
+
     /// Lists the guards that were armed beyond their surfaces.
     void list_armed_beyond()
     {
@@ -1083,7 +1088,8 @@ protected:
     bool left_known_ = false;
     bool leaves_phase_ = false;  ///< `search_` still holds x⁻, which resets have left
     bool located_ = false;       ///< the current set lies inside the step, not at its start
-    bool first_set_ = false;     ///< it is the first of its instant
+    double began_at_ = 0;     ///< [s] where guards were armed for the first time, or by a restart
+    bool first_set_ = false;  ///< it is the first of its instant
     std::uint64_t armings_ = 0;  ///< number of times that all guards have been armed
     bool on_time_ = false;       ///< the current set coincides with a time event
     Pending pending_ = Pending::nothing;

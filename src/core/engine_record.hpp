@@ -88,8 +88,13 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
         const double ulp = epsilon * std::fabs(step_.time(at.s));
         const double rounded = std::fabs(at.value) + std::fabs(at.rate) * ulp;
+        const double close = 8 * finest_bracket(at.s, step_.h());
+        if (record.from > at.s + close) {  // what was found behind the set does not come
+            if (at.value != 0) bank_.arm(i, side_of(at.value));
+            continue;
+        }
         // It has crossed with the set, to no effect: rounding does not take it back.
-        if (record.from > 0 && at.s - record.from <= 8 * finest_bracket(at.s, step_.h())) {
+        if (record.from > 0 && at.s - record.from <= close) {
             if (!record.info.boolean) record.noted.band = rounded;
             continue;
         }

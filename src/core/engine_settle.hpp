@@ -131,7 +131,8 @@ inline void EventEngine<X, single>::arm_at_start(bool begins)
     newly_armed_ = true;
     watching_ = false;
     last_h_ = h_next_;
-    bank_.begin_phase(step_.time(0));
+    began_at_ = step_.time(0);
+    bank_.begin_phase(began_at_);
     bank_.sample_start(step_, calls(), h_next_);
     bank_.keep_armed_values();
     for (std::size_t i = 0; i < bank_.size(); ++i) {
@@ -146,7 +147,10 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
     const GuardInfo& info = record.info;
     const double g = bank_.g0(i);
     if (!std::isfinite(g)) throw_start_guard_not_finite(who_, i, info.name, options_.t_start, g);
-    const bool on = g == 0 || (info.unilateral && g < 0 && -g <= rounding_of(i));
+    // A restart may leave it on the side that it had before its event at this time.
+    const bool had_event = !begins && !record.acting && has_event_at(i, began_at_);
+    const bool on =
+        g == 0 || ((info.unilateral ? g < 0 : had_event) && std::fabs(g) <= rounding_of(i));
     if (on) record.band = std::fabs(g);
     record.departs = on;
     const Side side = on ? heading(i) : side_of(g);
@@ -166,6 +170,24 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
         if (side == Side::plateau) bank_[i].armed_on = true;
     } else if (arming != life::Arming::outside && counts_here(i)) {
         have_event(i, arming, side);
+    }
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::has_event_at(std::size_t i, double t) const
+{
+    return std::any_of(run_.events.begin(), run_.events.end(),
+                       [=](const Event<X>& event) { return event.guard == i && event.t == t; });
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::forget_armed_beyond()
+{
+    for (std::size_t i = 0; i < bank_.size(); ++i) {
+        const GuardRecord& record = std::as_const(bank_)[i];
+        if (!record.armed_beyond || is_beyond(record.side, record.info.crossing)) continue;
+        bank_[i].armed_beyond = bank_[i].armed_on = false;
+        --run_.statistics.armed_beyond;
     }
 }
 
@@ -257,6 +279,8 @@ inline void EventEngine<X, single>::arm_all()
         }
     });
     first_set_ = false;
+    // What the events of the start have moved back is not beyond its surface.
+    if (run_.statistics.armed_beyond > 0 && step_.time(0) == began_at_) forget_armed_beyond();
 }
 
 template <class X, bool single>

@@ -366,9 +366,9 @@ private:
 
     [[nodiscard]] bool may_run_quietly() const noexcept
     {
-        return quiet_ && holds_.empty() && run_.statistics.steps < next_review_ &&
-               !options_.record_steps && next_sample_ >= options_.sample_times.size() &&
-               bank_.is_steady();
+        return quiet_ && holds_.empty() && step_.start().value != options_.t_end &&
+               run_.statistics.steps < next_review_ && !options_.record_steps &&
+               next_sample_ >= options_.sample_times.size() && bank_.is_steady();
     }
 
     /// Takes steps until one needs a check, and handles it. False: no step did. After an exception

@@ -157,6 +157,10 @@ void Loop<X, single>::extend(double t_end)
     (backward_ ? this->span_.from : this->span_.to) = options_.t_end;
     step_.renew_span();
     place_ = step_.place();
+    if (!(h_next_ > 0)) {  // the run had no length
+        h_next_ = initial_step(step_, options_, step_.until(options_.t_end));
+        first_step_ = h_next_ = std::min(h_next_, options_.h_max);
+    }
     reopen();
     next_review_ = 0;
 }

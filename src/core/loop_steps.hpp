@@ -39,7 +39,8 @@ bool Loop<X, single>::show_next()
         if (!together) return true;
     }
     if (has_sample) {
-        ++shown_samples_;
+        const double at = samples[shown_samples_];
+        while (shown_samples_ < samples.size() && samples[shown_samples_] == at) ++shown_samples_;
         showing_ = Showing::sample;
         return true;
     }
@@ -93,7 +94,10 @@ template <class X, bool single>
 inline void Loop<X, single>::advance_from_here(const Advance& how)
 {
     const double remaining = step_.until(options_.t_end);
-    if (!(remaining > 0)) return reach_end();
+    // At the double of the end only a time event can be left.
+    const bool arrived =
+        step_.start().value == options_.t_end && !(timed_ && step_.until(time_event_) <= remaining);
+    if (arrived || !(remaining > 0)) return reach_end();
     if (run_.statistics.steps >= next_review_ && !may_take_more_steps()) return;
     if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
         if (is_tentative()) take_back();

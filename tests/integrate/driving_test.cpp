@@ -2,6 +2,7 @@
 // go on.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -326,6 +327,62 @@ TEST(Driving, ARestartThatIsRefusedLeavesNoEventOfIt)
     EXPECT_THROW(simulation.restart(0.25, Two{5, 0.25}), std::runtime_error);
     EXPECT_EQ(simulation.run().events.size(), before);
     EXPECT_EQ(simulation.run().statistics.events, before);
+}
+
+TEST(Driving, ARestartAtARecordedEventDoesNotRecordItAgain)
+{
+    struct Passage {
+        using State = std::array<double, 1>;
+        double at;
+        void flow(double /*t*/, const State& /*x*/, State& dxdt) const { dxdt = {1}; }
+        [[nodiscard]] double guard(double /*t*/, const State& x) const { return x[0] - at; }
+        [[nodiscard]] GuardInfo guard_info() const
+        {
+            return {.crossing = Crossing::either, .resets = false};
+        }
+        void reset(double /*t*/, State& /*x*/) const {}
+    };
+    for (int k = 1; k < 400; ++k) {
+        const Passage passage{0.0371 * k};
+        Simulation simulation(passage, {0.0}, {.t_end = 40});
+        ASSERT_TRUE(simulation.advance());
+        const double t = simulation.t();
+        const auto x = simulation.x();
+        simulation.restart(t, x);
+        while (simulation.advance()) {
+        }
+        EXPECT_EQ(simulation.run().events.size(), 1U) << k;
+    }
+}
+
+TEST(Driving, ARunWithoutALengthIsExtended)
+{
+    struct Plain {
+        using State = std::array<double, 1>;
+        void flow(double /*t*/, const State& /*x*/, State& dxdt) const { dxdt = {1}; }
+    };
+    const auto check = [](double step, const auto& stepping) {
+        Simulation simulation(Plain{}, {0.0}, {.t_end = 0, .step = step}, stepping);
+        while (simulation.advance()) {
+        }
+        simulation.extend(2);
+        const auto run = simulation.take();
+        EXPECT_EQ(run.t, 2);
+        EXPECT_NEAR(run.x[0], 2, 1e-14);
+        EXPECT_LT(run.statistics.steps, 100U);
+    };
+    check(0, ErrorControlled<Dopri5>{});
+    check(0, ErrorControlled<Fehlberg78>{});
+    check(0.1, FixedStep<Rk4>{});
+}
+
+TEST(Driving, ASampleTimeThatIsListedTwiceIsOneStop)
+{
+    Simulation simulation(Oscillator{}, Two{1, 0.1}, {.t_end = 1.4, .sample_times = {1, 1.2, 1.2}});
+    std::vector<double> stops;
+    while (simulation.advance()) stops.push_back(simulation.t());
+    EXPECT_EQ(std::count(stops.begin(), stops.end(), 1.2), 1);
+    EXPECT_EQ(simulation.run().trajectory.t, (std::vector<double>{1, 1.2, 1.2}));
 }
 
 TEST(Driving, ARunThatHasEndedRestarts)

@@ -1319,5 +1319,107 @@ TEST(Meaning, AResetThatChangesAVariableOfTheGuardCutsTheStep)
     EXPECT_EQ(run.events.size(), 10U);
 }
 
+// --- one guard beside the events of another ---
+
+/// x rises to 1/2 at t = 2 and falls again; a guard beside it changes the state at t = `at`.
+struct TouchesLater {
+    using State = Array<3>;
+    double top = 0.5, at = 1.5;
+    GuardInfo info{};
+    std::size_t guard_count = 2;
+    void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -0.5, 0}; }
+    [[nodiscard]] double guard(std::size_t i, double t, const State& x) const
+    {
+        return i == 0 ? top - x[0] : at - t;
+    }
+    [[nodiscard]] GuardInfo guard_info(std::size_t i) const { return i == 0 ? info : GuardInfo{}; }
+    void reset(std::size_t, double, State& x) const { x[2] += 1; }
+};
+
+TEST(Meaning, ATouchBehindAnEventOfTheSameStepIsNoCrossingAtThatEvent)
+{
+    const auto check = [](const TouchesLater& system, const auto& detector) {
+        const auto run =
+            integrate(system, {-0.5, 1.0, 0.0}, {.t_end = 4}, ErrorControlled<Dopri5>{}, detector);
+        ASSERT_FALSE(run.events.empty());
+        EXPECT_EQ(run.events[0].guard, 1U);
+        EXPECT_NEAR(run.events[0].t, system.at, 1e-12);
+        for (std::size_t k = 1; k < run.events.size(); ++k) {
+            EXPECT_EQ(run.events[k].kind, EventKind::touch);
+            EXPECT_NEAR(run.events[k].t, 2, 1e-3);
+        }
+        EXPECT_EQ(run.t, 4);
+        EXPECT_EQ(run.x[2], 1);
+    };
+    for (const double at : {0.3, 1.0, 1.5, 1.7, 1.9}) {
+        for (const std::uint32_t stop_after : {0U, 1U}) {
+            for (const bool resets : {false, true}) {
+                TouchesLater system{.at = at};
+                system.info = {.resets = resets, .stop_after = stop_after};
+                check(system, Extremum{});
+                check(system, Bernstein{});
+                system.info.crossing = Crossing::either;
+                check(system, Extremum{});
+                // 1/2 is passed by 0.01, inside the band of a touch.
+                system.top = 0.51;
+                system.info.touch = 0.02;
+                if (at < 1.7) check(system, Extremum{});
+            }
+        }
+    }
+}
+
+TEST(Meaning, ACrossingAtAnEventAtTheEndIsRecordedOnce)
+{
+    struct Both {
+        using State = Array<2>;
+        double start, at;
+        std::size_t guard_count = 2;
+        void flow(double, const State&, State& dxdt) const { dxdt = {1, 0}; }
+        [[nodiscard]] double guard(std::size_t i, double t, const State& x) const
+        {
+            return i == 0 ? start + at - x[0] : at - t;
+        }
+        [[nodiscard]] GuardInfo guard_info(std::size_t i) const
+        {
+            GuardInfo info;
+            if (i == 0) info.crossing = Crossing::either;
+            info.resets = i == 1;
+            return info;
+        }
+        void reset(std::size_t, double, State& x) const { x[1] += 1; }
+    };
+    for (int j = 1; j < 30; ++j) {
+        for (int k = 1; k < 30; ++k) {
+            const Both both{0.1 * j, 0.05 * k};
+            Simulation simulation(both, {both.start, 0.0}, {.t_end = both.at});
+            while (simulation.advance()) {
+            }
+            EXPECT_EQ(simulation.run().events.size(), 2U) << j << ' ' << k;
+            simulation.extend(both.at + 1);
+            EXPECT_EQ(simulation.take().events.size(), 2U) << j << ' ' << k;
+            EXPECT_EQ(integrate(both, {both.start, 0.0}, {.t_end = both.at}).events.size(), 2U);
+        }
+    }
+}
+
+TEST(Meaning, AGuardThatAnEventOfTheStartMovesInsideDidNotBeginBeyond)
+{
+    struct Lifted {
+        using State = Array<1>;
+        Times time_events{0};
+        void flow(double, const State&, State& dxdt) const { dxdt = {-1}; }
+        [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
+        void reset(double, State& x) const { x[0] += 1; }
+        void time_reset(double, State& x) const { x[0] = 0.5; }
+    };
+    for (const double start : {0.0, -1.0}) {
+        const auto run = integrate(Lifted{}, {start}, {.t_end = 2.25});
+        EXPECT_EQ(run.events.size(), 3U);
+        EXPECT_EQ(run.statistics.armed_beyond, 0U);
+        EXPECT_EQ(describe(run), describe(Outcome::reached_end));
+    }
+}
+
 }  // namespace
 }  // namespace ricochet
