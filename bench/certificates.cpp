@@ -23,13 +23,13 @@
 #include <vector>
 
 #include "certificates.hpp"
+#include "learn/trainable_mlp.hpp"
 #include "problems/cavern.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "problems/planar_arm.hpp"
-#include "ricochet/detail/adam.hpp"
-#include "ricochet/detail/random.hpp"
-#include "ricochet/detail/trainable_mlp.hpp"
+#include "ricochet/base/random.hpp"
 #include "ricochet/learn/certify.hpp"
+#include "ricochet/learn/detail/adam.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::bench {

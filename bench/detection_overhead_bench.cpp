@@ -16,17 +16,17 @@
 #include <string>
 #include <vector>
 
+#include "app/ballistic_line.hpp"
 #include "problems.hpp"
 #include "problems/cavern.hpp"
 #include "problems/planar_arm.hpp"
 #include "problems/zones.hpp"
-#include "ricochet/detail/ballistic_line.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/nn/model.hpp"
+#include "ricochet/planned.hpp"
 #include "score.hpp"
 #include "timing.hpp"
 

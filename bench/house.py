@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 OWN_SYSTEM = """
 #include <array>
 #include <cstdio>
-#include <ricochet/integrate/integrate.hpp>
+#include <ricochet/integrate.hpp>
 struct Ball {
     void flow(double, const std::array<double, 2>& x, std::array<double, 2>& dxdt) const
     {
@@ -84,7 +84,7 @@ def preprocessed():
 
 def compile_times():
     readme = re.search(r"```cpp\n(// readme\.cpp.*?)```", (ROOT / "README.md").read_text(), re.S)[1]
-    integrate = "#include <ricochet/integrate/integrate.hpp>\n"
+    integrate = "#include <ricochet/integrate.hpp>\n"
     cases = [("ten lines with an own system, -O2", OWN_SYSTEM, ["-O2"], 0.9),
              ("ten lines with the umbrella and a ready system, -O2", readme, ["-O2"], 1.0),
              ("ten lines with an own system, -O0", OWN_SYSTEM, ["-O0"], 0.7),

@@ -11,10 +11,10 @@
 #include <string>
 
 #include "problems.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
-#include "ricochet/locate/locators.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/locators.hpp"
+#include "ricochet/methods.hpp"
 #include "timing.hpp"
 
 namespace {

@@ -16,9 +16,9 @@
 #include <vector>
 
 #include "problems/cave_body.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
+#include "ricochet/planned.hpp"
 #include "timing.hpp"
 #ifdef RICOCHET_BENCH_FCL
 #include "peers/fcl.hpp"

@@ -10,7 +10,7 @@
 #include "ricochet/faults/friction.hpp"
 #include "ricochet/faults/spring_slider.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/scene/simulate.hpp"
 #include "timing.hpp"
 

@@ -8,13 +8,13 @@
 #include "paths.hpp"
 #include "recorded_oscillators.hpp"
 #include "report/problems.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
-#include "ricochet/lanes.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/taylor/lanes.hpp"
+#include "ricochet/taylor/taylor.hpp"
 #include "timing.hpp"
 
 namespace ricochet::bench {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "timing.hpp"
 
 namespace {

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "problems.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
+#include "ricochet/planned.hpp"
 #include "timing.hpp"
 
 namespace ricochet::bench {

@@ -6,9 +6,9 @@
 #include <string_view>
 
 #include "odeint_by_hand.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::bench {

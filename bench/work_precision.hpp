@@ -24,7 +24,7 @@
 #include <vector>
 
 #include "problems.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "score.hpp"
 #include "timing.hpp"
 

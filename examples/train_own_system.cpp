@@ -9,8 +9,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/learn/train.hpp"
 
 struct Drone {

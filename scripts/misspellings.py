@@ -2,7 +2,7 @@
 """Writes the likely misspellings of the names that a hybrid system, or an inclusion, may declare.
 
 usage: misspellings.py > include/ricochet/detail/misspellings.inc
-       misspellings.py inclusion > include/ricochet/detail/inclusion_misspellings.inc
+       misspellings.py inclusion > include/ricochet/nonsmooth/detail/inclusion_misspellings.inc
 """
 
 import sys

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 
 namespace ricochet::test {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "ricochet/detect/gates.hpp"
+#include "ricochet/gates.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::test {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "random_systems.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::test {
 

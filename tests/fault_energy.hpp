@@ -20,7 +20,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "ricochet/detail/stiffness_series.hpp"
+#include "faults/stiffness_series.hpp"
 #include "ricochet/faults/friction.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 

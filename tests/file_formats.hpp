@@ -23,15 +23,15 @@
 #include <string_view>
 #include <vector>
 
+#include "faults/fault_kernel.hpp"
 #include "learn/certify_checkpoint.hpp"
+#include "learn/checkpoint.hpp"
 #include "learn/checkpoint_file.hpp"
 #include "mutator.hpp"
 #include "nn_models.hpp"
-#include "ricochet/detail/checkpoint.hpp"
-#include "ricochet/detail/fault_kernel.hpp"
 #include "ricochet/faults/friction.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/learn/policies.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/learn_steps/policies.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/scene/simulate.hpp"

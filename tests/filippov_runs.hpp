@@ -4,8 +4,8 @@
 #include <cstddef>
 #include <functional>
 
-#include "ricochet/hybrid/filippov.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/filippov.hpp"
+#include "ricochet/integrate.hpp"
 
 namespace ricochet::test {
 

@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "ricochet/detail/guard_view.hpp"
-#include "ricochet/detect/step_probe.hpp"
+#include "ricochet/step_probe.hpp"
 
 namespace ricochet::test {
 

@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "host_step.hpp"
-#include "ricochet/detect/step_probe.hpp"
+#include "ricochet/step_probe.hpp"
 
 namespace ricochet::test {
 

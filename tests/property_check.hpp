@@ -13,10 +13,10 @@
 
 #include "exact_run.hpp"
 #include "random_systems.hpp"
-#include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/bernstein.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 
 namespace ricochet::test {
 

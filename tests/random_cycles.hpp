@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 
 namespace ricochet::test {
 

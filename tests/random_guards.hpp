@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 
 namespace ricochet::test {
 

@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detail/linear_cases.hpp"
+#include "ricochet/nonsmooth/detail/linear_cases.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
 
 namespace ricochet::test {

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "random_inclusions.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::test {
 

@@ -11,9 +11,9 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/random.hpp"
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/base/random.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet::test {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-#include "ricochet/detail/incremental.hpp"
+#include "ricochet/faults/incremental.hpp"
 
 namespace ricochet::test {
 

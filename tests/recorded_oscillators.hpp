@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::test {
 

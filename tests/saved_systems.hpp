@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "refusal.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 
 namespace ricochet::test {
 

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "refusal.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/hybrid/system.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet {
 

@@ -4,8 +4,8 @@
 #include <memory>
 #include <string_view>
 
-#include "geometry/mesh.hpp"
-#include "geometry/triangles.hpp"
+#include "problems/geometry/mesh.hpp"
+#include "problems/geometry/triangles.hpp"
 
 namespace ricochet::bench {
 

@@ -9,7 +9,7 @@
 
 #include "cells.hpp"
 #include "ricochet/faults/fault_system.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/rosenbrock.hpp"
 #ifdef RICOCHET_REPORT_CVODE
 #include <cvode/cvode.h>

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "problems.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 #include "scene/gas.hpp"
 
 namespace ricochet::report {

@@ -34,7 +34,7 @@
 #include "crossover.hpp"
 #include "problems/cavern.hpp"
 #include "problems/opaque.hpp"
-#include "ricochet/detect/gates.hpp"
+#include "ricochet/gates.hpp"
 #include "ricochet/learn/train.hpp"
 
 namespace ricochet::bench {

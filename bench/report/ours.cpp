@@ -1,7 +1,7 @@
 // ricochet itself: Runge-Kutta methods with the default detector.
 #include "cells.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 
 namespace ricochet::report {
 

@@ -8,13 +8,13 @@
 #include <ctime>
 
 #include "allocations.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 
 #if defined(RICOCHET_PAYS_planning)
-#include "ricochet/detect/planned.hpp"
+#include "ricochet/planned.hpp"
 #elif defined(RICOCHET_PAYS_network)
-#include "ricochet/detect/gates.hpp"
+#include "ricochet/gates.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #elif defined(RICOCHET_PAYS_friction)
@@ -23,7 +23,7 @@
 #elif defined(RICOCHET_PAYS_sensitivities)
 #include "ricochet/sensitivity/sensitivities.hpp"
 #elif defined(RICOCHET_PAYS_taylor)
-#include "ricochet/taylor.hpp"
+#include "ricochet/taylor/taylor.hpp"
 #endif
 
 namespace {

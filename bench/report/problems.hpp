@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 

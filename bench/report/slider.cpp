@@ -6,8 +6,8 @@
 #include "ricochet/faults/spring_slider.hpp"
 
 #include "cells.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/rosenbrock.hpp"
 #ifdef RICOCHET_REPORT_CVODE
 #include <sunlinsol/sunlinsol_dense.h>

@@ -4,8 +4,8 @@
 
 #include "cells.hpp"
 #include "hosts/stiff_systems.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/rosenbrock.hpp"
 #ifdef RICOCHET_REPORT_CVODE
 #include <sunlinsol/sunlinsol_dense.h>

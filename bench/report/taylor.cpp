@@ -1,8 +1,8 @@
 // ricochet itself: Taylor series of the flow.
-#include "ricochet/taylor.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 #include "cells.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 
 namespace ricochet::report {
 

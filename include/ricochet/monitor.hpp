@@ -32,9 +32,9 @@
 #include "ricochet/detail/declarations.hpp"
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/monitor_core.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/hybrid/system.hpp"
-#include "ricochet/locate/locators.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/locators.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet {
 

@@ -23,7 +23,7 @@
 #include <utility>
 
 #include "ricochet/detail/components.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/methods.hpp"
 
 namespace Eigen {
 template <typename Scalar, int Rows, int Cols, int Options, int MaxRows, int MaxCols>

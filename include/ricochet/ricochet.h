@@ -224,7 +224,7 @@ typedef struct rc_callbacks {
     rc_time_event_fn previous_time_event; /**< for runs backward in time */
     rc_time_reset_fn time_reset;          /**< null: a time event changes nothing */
 
-    /* How fast guards can change, for RC_PLANNED; see ricochet/hybrid/bounds.hpp. */
+    /* How fast guards can change, for RC_PLANNED; see ricochet/bounds.hpp. */
     rc_bound_fn speed_bound; /**< upper bound of the path per second, now */
     rc_bound_fn
         acceleration_bound;  /**< change of that speed per second; null: speed_bound always holds */
@@ -276,7 +276,7 @@ typedef enum rc_method {
     RC_RK4 = 3,   /**< fixed steps only */
     RC_EULER = 4, /**< fixed steps only */
     RC_TAYLOR = 5 /**< power series, which need the flow as a formula: refused for callbacks, and
-                     offered by C++ (ricochet/taylor.hpp) and by ready systems in Python */
+                     offered by C++ (ricochet/taylor/taylor.hpp) and by ready systems in Python */
 } rc_method;
 
 /** How events in a step are detected. */

@@ -8,7 +8,7 @@
 //
 //     void jacobian([Mode,] double t, const X& x, std::span<double> rows) const
 //
-// the one from dual numbers, if the flow takes any scalar (hybrid/guard.hpp), or forward
+// the one from dual numbers, if the flow takes any scalar (guard.hpp), or forward
 // differences, whose error of 1e-8 reduces the order of the method at tolerances below that. The
 // matrix is dense: the method is for states of up to a few dozen components.
 #pragma once
@@ -26,7 +26,7 @@
 #include "ricochet/detail/dual_derivatives.hpp"
 #include "ricochet/detail/kernels.hpp"
 #include "ricochet/dual.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet {
 

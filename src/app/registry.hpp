@@ -13,8 +13,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/run.hpp"
 #include "settings.hpp"
 
 namespace ricochet::app {

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/options.hpp"
 
 namespace ricochet {
 class StepPolicy;

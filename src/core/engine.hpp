@@ -33,8 +33,8 @@
 #include "core/step.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/refusals.hpp"
-#include "ricochet/integrate/options.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/options.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::detail {
 

@@ -12,9 +12,9 @@
 #include "core/tolerances.hpp"
 #include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/detector_table.hpp"
-#include "ricochet/detect/step_probe.hpp"
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/options.hpp"
+#include "ricochet/step_probe.hpp"
 
 namespace ricochet::detail {
 

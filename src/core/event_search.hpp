@@ -20,14 +20,14 @@
 #include "core/step.hpp"
 #include "core/step_cover.hpp"
 #include "core/tolerances.hpp"
+#include "resolved_parts.hpp"
 #include "ricochet/detail/detector_table.hpp"
-#include "ricochet/detail/resolved_parts.hpp"
 #include "ricochet/detail/series_guard.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/step_probe.hpp"
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/integrate/options.hpp"
-#include "ricochet/locate/locators.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/locators.hpp"
+#include "ricochet/options.hpp"
+#include "ricochet/step_probe.hpp"
 
 namespace ricochet::detail {
 

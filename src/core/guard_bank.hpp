@@ -15,10 +15,10 @@
 #include "core/step.hpp"
 #include "core/tolerances.hpp"
 #include "ricochet/detail/cubic_check.hpp"
-#include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/finding.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail {
 

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail::life {
 

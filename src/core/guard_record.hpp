@@ -12,10 +12,10 @@
 
 #include "core/lost_row.hpp"
 #include "ricochet/detail/detector_table.hpp"
-#include "ricochet/detail/finding.hpp"
-#include "ricochet/detail/shrinking_intervals.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/finding.hpp"
+#include "ricochet/guard.hpp"
+#include "shrinking_intervals.hpp"
 
 namespace ricochet::detail {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "ricochet/detail/components.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "ricochet/options.hpp"
 
 namespace ricochet::detail {
 

@@ -16,10 +16,10 @@
 #include <utility>
 #include <vector>
 
-#include "core/wide.hpp"
-#include "ricochet/detail/instant.hpp"
+#include "base/wide.hpp"
 #include "ricochet/detail/runge_kutta.hpp"
 #include "ricochet/detail/step_state.hpp"
+#include "ricochet/instant.hpp"
 
 namespace ricochet::detail {
 

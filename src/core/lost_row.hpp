@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "core/tolerances.hpp"
-#include "ricochet/detail/instant.hpp"
+#include "ricochet/instant.hpp"
 
 namespace ricochet::detail {
 

@@ -27,8 +27,8 @@
 #include "core/tolerances.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/stop.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/stop.hpp"
 
 namespace ricochet::detail {
 

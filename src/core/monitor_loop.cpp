@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "core/out_of_turn.hpp"
+#include "base/out_of_turn.hpp"
 
 namespace ricochet::detail {
 

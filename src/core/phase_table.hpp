@@ -13,7 +13,7 @@
 
 #include "ricochet/detail/own_mode.hpp"
 #include "ricochet/detail/step_state.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::detail {
 

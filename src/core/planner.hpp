@@ -23,8 +23,8 @@
 #include "core/metering.hpp"
 #include "core/tentative_steps.hpp"
 #include "core/tolerances.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/planned.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::detail {
 

@@ -7,9 +7,9 @@
 #include <limits>
 #include <span>
 
+#include "base/wide.hpp"
 #include "core/guard_record.hpp"
 #include "core/tolerances.hpp"
-#include "core/wide.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/guard_view.hpp"
 

@@ -12,15 +12,15 @@
 #include <limits>
 #include <span>
 
+#include "base/wide.hpp"
 #include "core/sampled_guards.hpp"
 #include "core/step.hpp"
 #include "core/tolerances.hpp"
-#include "core/wide.hpp"
+#include "ricochet/bernstein.hpp"
 #include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/series_guard.hpp"
-#include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail {
 

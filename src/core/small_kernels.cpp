@@ -5,7 +5,7 @@
 #include <cstddef>
 
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detect/extremum.hpp"
+#include "ricochet/extremum.hpp"
 
 namespace ricochet::detail {
 

@@ -19,10 +19,10 @@
 #include "core/tolerances.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
-#include "ricochet/detail/instant.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "ricochet/instant.hpp"
+#include "ricochet/options.hpp"
 
 namespace ricochet::detail {
 

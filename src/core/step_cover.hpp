@@ -21,7 +21,7 @@
 #include "core/step.hpp"
 #include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/detector_table.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail {
 

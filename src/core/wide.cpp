@@ -1,4 +1,4 @@
-#include "core/wide.hpp"
+#include "base/wide.hpp"
 
 #include "ricochet/detail/components.hpp"
 

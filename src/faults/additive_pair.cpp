@@ -6,8 +6,8 @@
 #include <boost/math/quadrature/gauss_kronrod.hpp>
 #include <cmath>
 
-#include "../checks/require.hpp"
-#include "fast_tanh.hpp"
+#include "base/fast_tanh.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

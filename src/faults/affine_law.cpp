@@ -1,4 +1,4 @@
-#include "ricochet/detail/affine_law.hpp"
+#include "ricochet/faults/affine_law.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 #include "fault_bathe_stage.hpp"
 #include "fault_forces.hpp"
 #include "rupture_record.hpp"

@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "ricochet/detail/stiffness_series.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
+#include "stiffness_series.hpp"
 
 namespace ricochet::detail {
 

@@ -1,4 +1,4 @@
-#include "ricochet/detail/fault_friction_stage.hpp"
+#include "fault_friction_stage.hpp"
 
 #include <cmath>
 

@@ -1,4 +1,4 @@
-#include "ricochet/detail/fault_kernel.hpp"
+#include "fault_kernel.hpp"
 
 #include <cmath>
 #include <numbers>

@@ -5,10 +5,10 @@
 #include <cmath>
 #include <utility>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 #include "fault_forces.hpp"
-#include "ricochet/detail/fault_friction_stage.hpp"
-#include "ricochet/detail/variational_step.hpp"
+#include "fault_friction_stage.hpp"
+#include "ricochet/faults/variational_step.hpp"
 #include "rupture_record.hpp"
 
 namespace ricochet {

@@ -5,7 +5,7 @@
 #include <complex>
 #include <utility>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 #include "fault_forces.hpp"
 #include "rupture_record.hpp"
 

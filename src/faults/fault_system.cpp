@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 #include "fault_forces.hpp"
 #include "ricochet/faults/friction.hpp"
 

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <stdexcept>
 
-#include "../checks/require.hpp"
-#include "ricochet/detail/splitmix.hpp"
+#include "base/require.hpp"
+#include "ricochet/base/detail/splitmix.hpp"
 
 namespace ricochet {
 

@@ -1,6 +1,6 @@
-#include "ricochet/detail/incremental.hpp"
+#include "ricochet/faults/incremental.hpp"
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

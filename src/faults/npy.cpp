@@ -12,8 +12,8 @@
 #include <string>
 #include <string_view>
 
-#include "../files/read_file.hpp"
-#include "ricochet/detail/fault_kernel.hpp"
+#include "base/read_file.hpp"
+#include "fault_kernel.hpp"
 
 namespace ricochet {
 

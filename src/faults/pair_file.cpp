@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "../files/read_file.hpp"
-#include "../files/strict_json.hpp"
+#include "base/read_file.hpp"
+#include "base/strict_json.hpp"
 #include "ricochet/faults/friction.hpp"
 
 namespace ricochet {

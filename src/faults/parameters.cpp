@@ -1,10 +1,10 @@
-#include "ricochet/detail/parameters.hpp"
+#include "ricochet/faults/parameters.hpp"
 
 #include <fmt/format.h>
 
 #include <stdexcept>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

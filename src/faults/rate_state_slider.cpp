@@ -1,6 +1,6 @@
 #include "ricochet/faults/spring_slider.hpp"
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../checks/require.hpp"
-#include "ricochet/detail/splitmix.hpp"
+#include "base/require.hpp"
+#include "ricochet/base/detail/splitmix.hpp"
 
 namespace ricochet {
 

@@ -1,4 +1,4 @@
-#include "ricochet/detail/stiffness_series.hpp"
+#include "stiffness_series.hpp"
 
 #include <fmt/format.h>
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "../checks/require.hpp"
-#include "ricochet/detail/fault_kernel.hpp"
+#include "base/require.hpp"
+#include "fault_kernel.hpp"
 
 namespace ricochet {
 

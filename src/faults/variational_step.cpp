@@ -1,11 +1,11 @@
-#include "ricochet/detail/variational_step.hpp"
+#include "ricochet/faults/variational_step.hpp"
 
 #include <fmt/format.h>
 
 #include <numbers>
 #include <stdexcept>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet::detail {
 

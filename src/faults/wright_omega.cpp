@@ -1,4 +1,4 @@
-#include "ricochet/detail/wright_omega.hpp"
+#include "ricochet/faults/detail/wright_omega.hpp"
 
 #include <array>
 #include <cmath>

@@ -10,7 +10,7 @@
 #include <deque>
 #include <span>
 
-#include "ricochet/detail/random.hpp"
+#include "ricochet/base/random.hpp"
 
 namespace ricochet::learn {
 

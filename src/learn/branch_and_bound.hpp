@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-#include "ricochet/detail/bounds.hpp"
+#include "bounds.hpp"
 #include "ricochet/learn/certify.hpp"
 #include "ricochet/nn/mlp.hpp"
 

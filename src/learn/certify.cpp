@@ -7,12 +7,12 @@
 #include <cmath>
 #include <new>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 #include "branch_and_bound.hpp"
 #include "certify_checkpoint.hpp"
 #include "checkpoint_file.hpp"
 #include "proof.hpp"
-#include "ricochet/detail/random.hpp"
+#include "ricochet/base/random.hpp"
 
 namespace ricochet::learn {
 

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <system_error>
 
-#include "../files/read_file.hpp"
-#include "../files/strict_json.hpp"
+#include "base/read_file.hpp"
+#include "base/strict_json.hpp"
 
 namespace ricochet::learn {
 

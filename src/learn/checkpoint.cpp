@@ -1,4 +1,4 @@
-#include "ricochet/detail/checkpoint.hpp"
+#include "checkpoint.hpp"
 
 #include <string>
 #include <string_view>

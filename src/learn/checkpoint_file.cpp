@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "../files/read_file.hpp"
+#include "base/read_file.hpp"
 
 namespace ricochet::learn {
 

@@ -13,10 +13,10 @@
 
 #include <nlohmann/json.hpp>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
+#include "checkpoint.hpp"
 #include "checkpoint_file.hpp"
-#include "ricochet/detail/checkpoint.hpp"
-#include "ricochet/detail/trainable_mlp.hpp"
+#include "trainable_mlp.hpp"
 
 namespace ricochet::learn {
 

@@ -1,11 +1,11 @@
-#include "ricochet/detail/data_set.hpp"
+#include "ricochet/learn/data_set.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
-#include "../checks/require.hpp"
-#include "ricochet/detail/random.hpp"
+#include "base/require.hpp"
+#include "ricochet/base/random.hpp"
 
 namespace ricochet::learn {
 

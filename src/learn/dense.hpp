@@ -49,8 +49,8 @@ struct OuterProduct {
     T* sums = nullptr;    ///< null: none
 };
 
-/// One step of Adam (detail/adam.hpp) for n parameters, n whole cache lines. The gradient is the
-/// sum of `parts`, one after the other `part_stride` apart. Then, if there is a target,
+/// One step of Adam (learn/detail/adam.hpp) for n parameters, n whole cache lines. The gradient is
+/// the sum of `parts`, one after the other `part_stride` apart. Then, if there is a target,
 /// target += polyak (parameter - target).
 template <class T>
 struct AdamStep {

@@ -13,13 +13,13 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
+#include "checkpoint.hpp"
 #include "checkpoint_file.hpp"
 #include "limits.hpp"
-#include "ricochet/detail/assessment.hpp"
-#include "ricochet/detail/checkpoint.hpp"
-#include "ricochet/detail/random.hpp"
-#include "ricochet/detail/trainable_mlp.hpp"
+#include "ricochet/base/random.hpp"
+#include "ricochet/learn/assessment.hpp"
+#include "trainable_mlp.hpp"
 
 namespace ricochet::learn {
 

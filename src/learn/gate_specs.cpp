@@ -1,4 +1,4 @@
-#include "ricochet/detail/gate_specs.hpp"
+#include "gate_specs.hpp"
 
 #include <fmt/format.h>
 

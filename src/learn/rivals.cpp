@@ -1,4 +1,4 @@
-#include "ricochet/detail/rivals.hpp"
+#include "ricochet/learn/detail/rivals.hpp"
 #include "limits.hpp"
 
 #include <fmt/format.h>

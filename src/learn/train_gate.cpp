@@ -10,9 +10,9 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 #include "limits.hpp"
-#include "ricochet/detail/assessment.hpp"
+#include "ricochet/learn/assessment.hpp"
 
 namespace ricochet::learn {
 

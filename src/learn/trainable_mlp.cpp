@@ -1,4 +1,4 @@
-#include "ricochet/detail/trainable_mlp.hpp"
+#include "trainable_mlp.hpp"
 
 #include <algorithm>
 #include <array>

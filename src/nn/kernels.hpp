@@ -2,11 +2,11 @@
 //
 // Included by one file per instruction set, which is compiled with the flags of that set and
 // defines RICOCHET_KERNEL_NAMESPACE. Only functions in that namespace may be called here: see
-// detail/kernel.hpp.
+// nn/detail/kernel.hpp.
 #pragma once
 
 #include "kernel_table.hpp"
-#include "ricochet/detail/kernel.hpp"
+#include "ricochet/nn/detail/kernel.hpp"
 #include "ricochet/nn/mlp.hpp"
 
 #include <cstddef>

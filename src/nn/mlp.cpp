@@ -1,8 +1,8 @@
 #include "ricochet/nn/mlp.hpp"
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 #include "kernel_table.hpp"
-#include "ricochet/detail/pack.hpp"
+#include "ricochet/nn/detail/pack.hpp"
 
 #include <array>
 #include <new>

@@ -1,6 +1,6 @@
 #include "ricochet/nn/model.hpp"
 
-#include "../files/read_file.hpp"
+#include "base/read_file.hpp"
 #include "model_metadata.hpp"
 #include "safetensors_header.hpp"
 #include "self_test.hpp"

@@ -1,6 +1,6 @@
 #include "safetensors_header.hpp"
 
-#include "../files/strict_json.hpp"
+#include "base/strict_json.hpp"
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-#include "ricochet/detail/branch_kernels.hpp"
+#include "ricochet/nonsmooth/detail/branch_kernels.hpp"
 
 #include "ricochet/detail/kernels.hpp"
 

@@ -1,6 +1,6 @@
-#include "ricochet/detail/composite_step.hpp"
+#include "ricochet/nonsmooth/detail/composite_step.hpp"
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -7,7 +7,7 @@
 #include <cstring>
 
 #include "ricochet/detail/refusals.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "ricochet/options.hpp"
 
 namespace ricochet::detail {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "../core/phase_table.hpp"
-#include "ricochet/detail/contact_run.hpp"
 #include "ricochet/detail/system_table.hpp"
+#include "ricochet/nonsmooth/detail/contact_run.hpp"
 
 namespace ricochet::detail {
 

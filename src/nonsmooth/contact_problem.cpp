@@ -1,4 +1,4 @@
-#include "ricochet/detail/contact_problem.hpp"
+#include "ricochet/nonsmooth/detail/contact_problem.hpp"
 
 #include <fmt/format.h>
 
@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

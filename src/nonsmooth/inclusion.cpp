@@ -1,4 +1,4 @@
-#include "ricochet/detail/any_inclusion.hpp"
+#include "ricochet/nonsmooth/detail/any_inclusion.hpp"
 
 #include <fmt/format.h>
 

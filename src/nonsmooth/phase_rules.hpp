@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "../core/phase_table.hpp"
-#include "ricochet/detail/branch_phases.hpp"
-#include "ricochet/detail/phased_run.hpp"
-#include "ricochet/detail/stall_watch.hpp"
+#include "ricochet/nonsmooth/detail/branch_phases.hpp"
+#include "ricochet/nonsmooth/detail/phased_run.hpp"
+#include "ricochet/nonsmooth/detail/stall_watch.hpp"
 
 namespace ricochet::detail {
 

@@ -1,4 +1,4 @@
-#include "ricochet/detail/phased_run.hpp"
+#include "ricochet/nonsmooth/detail/phased_run.hpp"
 
 #include <algorithm>
 #include <cmath>

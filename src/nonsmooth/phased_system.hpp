@@ -32,8 +32,8 @@
 #include "../core/phase_table.hpp"
 #include "phase_rules.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detail/phased_run.hpp"
 #include "ricochet/detail/refusals.hpp"
+#include "ricochet/nonsmooth/detail/phased_run.hpp"
 
 namespace ricochet::detail {
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {

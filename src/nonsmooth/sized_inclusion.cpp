@@ -7,8 +7,8 @@
 #include <string_view>
 #include <utility>
 
-#include "ricochet/detail/inclusion_sizes.hpp"
-#include "ricochet/detail/phased_run.hpp"
+#include "ricochet/nonsmooth/detail/inclusion_sizes.hpp"
+#include "ricochet/nonsmooth/detail/phased_run.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 
 namespace ricochet::detail {

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "ricochet/detail/branch_phases.hpp"
-#include "ricochet/detail/owner.hpp"
+#include "ricochet/base/detail/owner.hpp"
+#include "ricochet/nonsmooth/detail/branch_phases.hpp"
 
 namespace ricochet::detail {
 

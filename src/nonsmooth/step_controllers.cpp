@@ -5,7 +5,7 @@
 #include <limits>
 #include <type_traits>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 namespace {

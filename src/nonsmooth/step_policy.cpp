@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -7,7 +7,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

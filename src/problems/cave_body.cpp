@@ -9,9 +9,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "../checks/require.hpp"
-#include "geometry/distance_grid.hpp"
+#include "base/require.hpp"
 #include "last_answer.hpp"
+#include "problems/geometry/distance_grid.hpp"
 
 namespace ricochet {
 

@@ -8,9 +8,9 @@
 #include <memory>
 #include <string_view>
 
-#include "geometry/mesh.hpp"
-#include "geometry/triangles.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "problems/geometry/mesh.hpp"
+#include "problems/geometry/triangles.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string_view>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <string_view>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

@@ -1,6 +1,6 @@
 #include "problems/incline_block.hpp"
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -7,10 +7,10 @@
 #include <memory>
 #include <numbers>
 
-#include "../checks/require.hpp"
-#include "geometry/concave_table.hpp"
+#include "base/require.hpp"
+#include "problems/geometry/concave_table.hpp"
 #include "problems/opaque.hpp"
-#include "ricochet/detail/splitmix.hpp"
+#include "ricochet/base/detail/splitmix.hpp"
 
 namespace ricochet {
 

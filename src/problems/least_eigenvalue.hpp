@@ -10,7 +10,7 @@
 #include <optional>
 #include <string_view>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

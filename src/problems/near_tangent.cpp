@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

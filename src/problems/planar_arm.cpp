@@ -9,11 +9,11 @@
 #include <optional>
 #include <stdexcept>
 
-#include "../checks/require.hpp"
-#include "geometry/distance_grid.hpp"
-#include "geometry/outline.hpp"
+#include "base/require.hpp"
 #include "last_answer.hpp"
-#include "ricochet/detail/splitmix.hpp"
+#include "problems/geometry/distance_grid.hpp"
+#include "problems/geometry/outline.hpp"
+#include "ricochet/base/detail/splitmix.hpp"
 
 namespace ricochet {
 

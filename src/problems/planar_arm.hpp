@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "geometry/segments.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "problems/geometry/segments.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

@@ -1,6 +1,6 @@
 #include "problems/rolling_ball.hpp"
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

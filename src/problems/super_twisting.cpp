@@ -1,6 +1,6 @@
 #include "problems/super_twisting.hpp"
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -1,6 +1,6 @@
 #include "problems/three_body.hpp"
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string_view>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

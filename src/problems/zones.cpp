@@ -4,8 +4,8 @@
 #include <memory>
 #include <numbers>
 
-#include "../checks/require.hpp"
-#include "ricochet/detail/splitmix.hpp"
+#include "base/require.hpp"
+#include "ricochet/base/detail/splitmix.hpp"
 
 namespace ricochet {
 

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

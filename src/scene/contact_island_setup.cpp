@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "checks/require.hpp"
+#include "base/require.hpp"
 #include "scene/contact_island.hpp"
 
 namespace ricochet::detail {

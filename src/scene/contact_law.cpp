@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "ricochet/detail/contact_problem.hpp"
+#include "ricochet/nonsmooth/detail/contact_problem.hpp"
 
 namespace ricochet::detail {
 

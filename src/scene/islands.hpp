@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/any_scene_system.hpp"
+#include "ricochet/scene/detail/any_scene_system.hpp"
 #include "scene/world.hpp"
 
 namespace ricochet::detail {

@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <unordered_map>
 
-#include "files/read_file.hpp"
-#include "files/strict_json.hpp"
+#include "base/read_file.hpp"
+#include "base/strict_json.hpp"
 #include "scene/json_lines.hpp"
 #include "scene/names.hpp"
 #include "scene/options.hpp"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

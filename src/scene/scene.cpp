@@ -7,8 +7,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "checks/require.hpp"
-#include "ricochet/detail/any_scene_system.hpp"
+#include "base/require.hpp"
+#include "ricochet/scene/detail/any_scene_system.hpp"
 #include "scene/motion.hpp"
 #include "scene/names.hpp"
 #include "scene/options.hpp"

@@ -9,7 +9,7 @@
 #include <optional>
 #include <utility>
 
-#include "checks/require.hpp"
+#include "base/require.hpp"
 #include "scene/groups.hpp"
 #include "scene/large_pages.hpp"
 #include "scene/options.hpp"

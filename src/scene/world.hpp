@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/detail/instant.hpp"
+#include "ricochet/instant.hpp"
 #include "ricochet/scene/simulate.hpp"
 #include "scene/motion.hpp"
 #include "scene/options.hpp"

@@ -1,8 +1,8 @@
-#include "ricochet/detail/differences.hpp"
+#include "ricochet/sensitivity/detail/differences.hpp"
 
 #include <fmt/format.h>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

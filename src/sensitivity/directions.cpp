@@ -1,8 +1,8 @@
-#include "ricochet/detail/directions.hpp"
+#include "ricochet/sensitivity/detail/directions.hpp"
 
 #include <fmt/format.h>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet::detail {
 

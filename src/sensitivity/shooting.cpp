@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <complex>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

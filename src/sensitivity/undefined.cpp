@@ -1,4 +1,4 @@
-#include "ricochet/detail/undefined.hpp"
+#include "ricochet/sensitivity/detail/undefined.hpp"
 
 namespace ricochet {
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detail/friction_study.hpp"
+#include "friction_study.hpp"
 
 namespace ricochet::app {
 

@@ -8,14 +8,14 @@
 #include <limits>
 #include <utility>
 
+#include "along_history.hpp"
+#include "identify_friction.hpp"
 #include "interrupt.hpp"
 #include "model_lookup.hpp"
 #include "paper_potentials.hpp"
 #include "papers.hpp"
-#include "ricochet/detail/along_history.hpp"
-#include "ricochet/detail/identify_friction.hpp"
-#include "ricochet/detail/variational_step.hpp"
 #include "ricochet/faults/spring_slider.hpp"
+#include "ricochet/faults/variational_step.hpp"
 
 namespace ricochet::app {
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "exhibit.hpp"
-#include "ricochet/learn/train_friction.hpp"
+#include "ricochet/learn_steps/train_friction.hpp"
 
 namespace ricochet::app {
 

@@ -17,7 +17,7 @@
 #include "papers.hpp"
 #include "policy_lookup.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
-#include "ricochet/learn/policies.hpp"
+#include "ricochet/learn_steps/policies.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"

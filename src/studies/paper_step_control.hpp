@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "exhibit.hpp"
-#include "ricochet/detail/step_environment.hpp"
+#include "ricochet/learn_steps/step_environment.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::app {

@@ -11,11 +11,11 @@
 
 #include "compare.hpp"
 #include "friction_tables.hpp"
+#include "identify_friction.hpp"
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "json_text.hpp"
 #include "report.hpp"
-#include "ricochet/detail/identify_friction.hpp"
 #include "run_watch.hpp"
 
 namespace ricochet::app {

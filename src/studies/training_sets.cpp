@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "ricochet/detail/gate_specs.hpp"
+#include "learn/gate_specs.hpp"
 #include "ricochet/faults/friction.hpp"
 #include "ricochet/learn/classifier.hpp"
 

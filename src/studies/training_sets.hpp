@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detail/data_set.hpp"
 #include "ricochet/learn/classifier.hpp"
+#include "ricochet/learn/data_set.hpp"
 
 namespace ricochet::studies {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -1,6 +1,6 @@
 #include "ricochet/systems/friction_inclusion.hpp"
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -1,8 +1,8 @@
-#include "ricochet/detail/friction_oscillator.hpp"
+#include "ricochet/systems/detail/friction_oscillator.hpp"
 
 #include <cmath>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

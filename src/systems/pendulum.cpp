@@ -3,7 +3,7 @@
 #include <limits>
 #include <numbers>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "../checks/require.hpp"
+#include "base/require.hpp"
 
 namespace ricochet {
 

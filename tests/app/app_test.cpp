@@ -7,7 +7,7 @@
 #include <sstream>
 #include <string>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 
 namespace ricochet::app_test {
 namespace {

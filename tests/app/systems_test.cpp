@@ -8,7 +8,7 @@
 #include "app.hpp"
 #include "problems/detest_f1.hpp"
 #include "problems/detest_f4.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/systems/stick_slip.hpp"
 #include "ricochet/systems/thermostat.hpp"
 

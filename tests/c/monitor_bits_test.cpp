@@ -13,7 +13,7 @@
 
 #include "ball.h"
 #include "check.h"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/monitor.hpp"
 #include "rk4_host.hpp"
 

@@ -16,8 +16,8 @@
 #include <vector>
 
 #include "host_step.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 
 namespace ricochet::test {
 

@@ -16,8 +16,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::test {

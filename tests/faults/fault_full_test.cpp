@@ -10,7 +10,7 @@
 #include <random>
 #include <string>
 
-#include "ricochet/detail/fault_friction_stage.hpp"
+#include "faults/fault_friction_stage.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::fault_full_test {

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "fault_as_slider.hpp"
+#include "faults/fault_friction_stage.hpp"
 #include "refusal.hpp"
-#include "ricochet/detail/fault_friction_stage.hpp"
 #include "ricochet/faults/spring_slider.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 

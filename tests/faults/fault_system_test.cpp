@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "refusal.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/rosenbrock.hpp"
 
 namespace ricochet::fault_system_test {

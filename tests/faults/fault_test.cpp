@@ -9,9 +9,9 @@
 #include <numbers>
 #include <string>
 
+#include "faults/fault_kernel.hpp"
+#include "faults/stiffness_series.hpp"
 #include "refusal.hpp"
-#include "ricochet/detail/fault_kernel.hpp"
-#include "ricochet/detail/stiffness_series.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 
 namespace ricochet::fault_test {

@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "rate_state_identities.hpp"
-#include "ricochet/detail/along_history.hpp"
-#include "ricochet/detail/baselines.hpp"
-#include "ricochet/detail/friction_study.hpp"
-#include "ricochet/detail/identify_friction.hpp"
 #include "ricochet/faults/spring_slider.hpp"
-#include "ricochet/learn/train_friction.hpp"
+#include "ricochet/learn_steps/train_friction.hpp"
+#include "studies/along_history.hpp"
+#include "studies/baselines.hpp"
+#include "studies/friction_study.hpp"
+#include "studies/identify_friction.hpp"
 #include "theta_reference.hpp"
 
 namespace ricochet::friction_full_test {

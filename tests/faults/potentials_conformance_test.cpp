@@ -5,7 +5,7 @@
 
 #include "additive_pairs.hpp"
 #include "rate_state_identities.hpp"
-#include "ricochet/detail/affine_law.hpp"
+#include "ricochet/faults/affine_law.hpp"
 #include "ricochet/faults/friction.hpp"
 
 namespace ricochet::test::potentials_conformance_test {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/detail/identify_friction.hpp"
 #include "ricochet/faults/friction.hpp"
+#include "studies/identify_friction.hpp"
 #include "theta_reference.hpp"
 
 namespace ricochet::rate_state_histories_test {

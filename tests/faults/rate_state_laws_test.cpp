@@ -8,8 +8,8 @@
 
 #include "rate_state_identities.hpp"
 #include "refusal.hpp"
-#include "ricochet/detail/affine_law.hpp"
-#include "ricochet/detail/wright_omega.hpp"
+#include "ricochet/faults/affine_law.hpp"
+#include "ricochet/faults/detail/wright_omega.hpp"
 
 namespace ricochet::rate_state_laws_test {
 namespace {

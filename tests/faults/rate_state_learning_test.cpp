@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "additive_pairs.hpp"
-#include "learn/friction_models.hpp"
-#include "ricochet/detail/along_history.hpp"
-#include "ricochet/detail/friction_study.hpp"
-#include "ricochet/learn/train_friction.hpp"
+#include "learn_steps/friction_models.hpp"
+#include "ricochet/learn_steps/train_friction.hpp"
+#include "studies/along_history.hpp"
+#include "studies/friction_study.hpp"
 
 namespace ricochet::rate_state_learning_test {
 namespace {

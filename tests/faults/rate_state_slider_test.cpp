@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 
 namespace ricochet::rate_state_slider_test {
 namespace {

@@ -7,9 +7,9 @@
 #include <type_traits>
 #include <vector>
 
-#include "ricochet/detail/baselines.hpp"
-#include "ricochet/detail/incremental.hpp"
+#include "ricochet/faults/incremental.hpp"
 #include "ricochet/faults/spring_slider.hpp"
+#include "studies/baselines.hpp"
 
 namespace ricochet::rate_state_step_test {
 namespace {

@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "hosts/host_systems.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/planned.hpp"
 
 namespace ricochet::hosts_test {
 

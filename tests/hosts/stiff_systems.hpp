@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::hosts_test {
 

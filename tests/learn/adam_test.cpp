@@ -1,4 +1,4 @@
-#include "ricochet/detail/adam.hpp"
+#include "ricochet/learn/detail/adam.hpp"
 
 #include <cmath>
 #include <stdexcept>

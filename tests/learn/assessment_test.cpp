@@ -1,4 +1,4 @@
-#include "ricochet/detail/assessment.hpp"
+#include "ricochet/learn/assessment.hpp"
 
 #include <cmath>
 #include <limits>

@@ -8,8 +8,8 @@
 
 #include <gtest/gtest.h>
 
+#include "ricochet/base/random.hpp"
 #include "ricochet/detail/features.hpp"
-#include "ricochet/detail/random.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"

@@ -15,9 +15,9 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/detail/bounds.hpp"
+#include "learn/bounds.hpp"
+#include "ricochet/base/random.hpp"
 #include "ricochet/detail/gate.hpp"
-#include "ricochet/detail/random.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 

@@ -14,8 +14,8 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
-#include "ricochet/detail/checkpoint.hpp"
-#include "ricochet/detail/random.hpp"
+#include "learn/checkpoint.hpp"
+#include "ricochet/base/random.hpp"
 #include "ricochet/nn/mlp.hpp"
 
 namespace ricochet::learn::classifier_test {

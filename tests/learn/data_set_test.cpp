@@ -1,4 +1,4 @@
-#include "ricochet/detail/data_set.hpp"
+#include "ricochet/learn/data_set.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -8,7 +8,7 @@
 
 #include <gtest/gtest.h>
 
-#include "ricochet/detail/random.hpp"
+#include "ricochet/base/random.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 namespace ricochet::features_test {

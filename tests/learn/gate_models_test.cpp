@@ -16,8 +16,8 @@
 #include "problems/cavern.hpp"
 #include "problems/least_eigenvalue.hpp"
 #include "problems/planar_arm.hpp"
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::gate_models_test {

@@ -8,7 +8,7 @@
 
 #include "problems/opaque.hpp"
 #include "problems/planar_arm.hpp"
-#include "ricochet/detect/gates.hpp"
+#include "ricochet/gates.hpp"
 #include "ricochet/learn/train.hpp"
 
 namespace ricochet::gates_full_test {

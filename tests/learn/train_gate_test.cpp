@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::learn::train_gate_test {

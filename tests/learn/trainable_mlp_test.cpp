@@ -1,4 +1,4 @@
-#include "ricochet/detail/trainable_mlp.hpp"
+#include "learn/trainable_mlp.hpp"
 
 #include <cmath>
 #include <stdexcept>

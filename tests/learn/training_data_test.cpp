@@ -6,7 +6,7 @@
 #include <set>
 
 #include "app.hpp"
-#include "ricochet/detail/fault_kernel.hpp"
+#include "faults/fault_kernel.hpp"
 #include "ricochet/faults/friction.hpp"
 
 namespace ricochet::studies::training_data_test {

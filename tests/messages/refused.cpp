@@ -6,8 +6,8 @@
 #include <cstddef>
 #include <span>
 
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/monitor.hpp"
 
 using namespace ricochet;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/rosenbrock.hpp"
 #include "ricochet/sensitivity/sensitivities.hpp"
 

@@ -3,8 +3,8 @@
 #include <array>
 #include <cstddef>
 
-#include "ricochet/hybrid/filippov.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/filippov.hpp"
+#include "ricochet/integrate.hpp"
 
 using namespace ricochet;
 using X = std::array<double, 2>;

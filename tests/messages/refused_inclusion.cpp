@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 
-#include "ricochet/detect/planned.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/planned.hpp"
 
 using namespace ricochet;
 using State = Eigen::Vector2d;

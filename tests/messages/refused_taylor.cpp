@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 using namespace ricochet;
 using X = std::array<double, 2>;

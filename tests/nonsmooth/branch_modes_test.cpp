@@ -5,7 +5,7 @@
 //
 // and two such blocks, of which one rubs on the other.
 
-#include "ricochet/detail/branch_modes.hpp"
+#include "ricochet/nonsmooth/detail/branch_modes.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 #include <cmath>
 #include <functional>
 
-#include "ricochet/detail/held_reactions.hpp"
+#include "ricochet/nonsmooth/detail/held_reactions.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 
 namespace ricochet {

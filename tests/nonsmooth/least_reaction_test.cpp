@@ -10,7 +10,7 @@
 #include <limits>
 #include <random>
 
-#include "ricochet/detail/least_reaction.hpp"
+#include "ricochet/nonsmooth/detail/least_reaction.hpp"
 
 namespace ricochet::detail {
 namespace {

@@ -1,6 +1,6 @@
 // Linear variational inequalities of a few unknowns.
 
-#include "ricochet/detail/linear_cases.hpp"
+#include "ricochet/nonsmooth/detail/linear_cases.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <limits>
 #include <random>
 
-#include "ricochet/detail/any_inclusion.hpp"
+#include "ricochet/nonsmooth/detail/any_inclusion.hpp"
 
 namespace ricochet::linear_cases_test {
 namespace {

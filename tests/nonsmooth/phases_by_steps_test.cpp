@@ -15,7 +15,7 @@
 #include "phased_runs.hpp"
 #include "refusal.hpp"
 #include "ricochet/odeint.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::phases_by_steps_test {
 namespace {

@@ -1,6 +1,6 @@
 // Newton's method for equations that are piecewise smooth.
 
-#include "ricochet/detail/semismooth_newton.hpp"
+#include "ricochet/nonsmooth/detail/semismooth_newton.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include <random>
 
-#include "ricochet/detail/sparse_direction.hpp"
+#include "sparse_direction.hpp"
 
 namespace ricochet::semismooth_newton_test {
 namespace {

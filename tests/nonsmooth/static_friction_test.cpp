@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/integrate/simulation.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/simulation.hpp"
 
 namespace ricochet::static_friction_test {
 namespace {

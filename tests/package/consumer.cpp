@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <vector>
 
-#include "ricochet/detect/gates.hpp"
+#include "ricochet/gates.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/ricochet.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"

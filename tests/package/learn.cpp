@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <span>
 
-#include "ricochet/learn/policies.hpp"
+#include "ricochet/learn_steps/policies.hpp"
 
 int main()
 {

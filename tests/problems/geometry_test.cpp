@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "geometry/concave_table.hpp"
-#include "geometry/distance_grid.hpp"
-#include "geometry/outline.hpp"
-#include "geometry/segments.hpp"
-#include "ricochet/detail/random.hpp"
+#include "problems/geometry/concave_table.hpp"
+#include "problems/geometry/distance_grid.hpp"
+#include "problems/geometry/outline.hpp"
+#include "problems/geometry/segments.hpp"
+#include "ricochet/base/random.hpp"
 #include "scene_bounds.hpp"
 
 namespace ricochet::geometry::geometry_test {

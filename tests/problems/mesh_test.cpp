@@ -8,10 +8,10 @@
 #include <limits>
 #include <string>
 
-#include "geometry/mesh.hpp"
-#include "geometry/triangles.hpp"
 #include "problems/cave_body.hpp"
-#include "ricochet/detail/random.hpp"
+#include "problems/geometry/mesh.hpp"
+#include "problems/geometry/triangles.hpp"
+#include "ricochet/base/random.hpp"
 #include "scene_bounds.hpp"
 
 namespace ricochet::geometry::mesh_test {

@@ -15,8 +15,8 @@
 #include "problems/opaque.hpp"
 #include "problems/planar_arm.hpp"
 #include "problems/zones.hpp"
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/nn/model.hpp"
 #include "scene_bounds.hpp"
 

@@ -10,7 +10,7 @@
 #include <random>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/scene/simulate.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "scene/brute_force.hpp"

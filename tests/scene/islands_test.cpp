@@ -6,7 +6,7 @@
 #include <cmath>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/scene/simulate.hpp"
 
 namespace ricochet::islands_test {

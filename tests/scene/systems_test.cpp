@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "refusal.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/scene/simulate.hpp"
 
 namespace ricochet::systems_test {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 #include "ricochet/sensitivity/sensitivities.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"

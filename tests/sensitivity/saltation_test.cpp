@@ -2,7 +2,7 @@
 // differences of motions that are known in closed form. The functions of the systems have no
 // declared derivatives; their five-point differences are exact up to degree four, so that 1e-10
 // holds their rounding.
-#include "ricochet/detail/saltation.hpp"
+#include "ricochet/sensitivity/detail/saltation.hpp"
 
 #include <gtest/gtest.h>
 

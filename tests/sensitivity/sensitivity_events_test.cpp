@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "ricochet/hybrid/filippov.hpp"
+#include "ricochet/filippov.hpp"
 #include "ricochet/sensitivity/sensitivities.hpp"
 #include "sensitivity_systems.hpp"
 

@@ -1,4 +1,4 @@
-#include "ricochet/locate/locators.hpp"
+#include "ricochet/locators.hpp"
 #include "ricochet/sensitivity/sensitivities.hpp"
 
 #include <gtest/gtest.h>

@@ -10,7 +10,7 @@
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 #include "ricochet/systems/thermostat.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::series_sensitivity_test {
 namespace {

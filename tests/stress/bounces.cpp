@@ -1,9 +1,9 @@
 // Balls that bounce for very long, and quantities of every size.
 #include <fmt/format.h>
 
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/stick_slip.hpp"
 #include "stress.hpp"

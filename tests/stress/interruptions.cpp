@@ -5,8 +5,8 @@
 #include <new>
 
 #include "random_systems.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 #include "stress.hpp"
 
 namespace {

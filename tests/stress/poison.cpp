@@ -5,11 +5,11 @@
 #include <limits>
 #include <span>
 
-#include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/bernstein.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/monitor.hpp"
+#include "ricochet/planned.hpp"
 #include "rk4_host.hpp"
 #include "stress.hpp"
 

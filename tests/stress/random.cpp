@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 #include "stress.hpp"

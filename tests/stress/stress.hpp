@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/random.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/base/random.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::stress {
 

@@ -1,4 +1,4 @@
-#include "ricochet/lanes.hpp"
+#include "ricochet/taylor/lanes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -12,10 +12,10 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 #include "ricochet/systems/thermostat.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::lazy_series_test {
 namespace {

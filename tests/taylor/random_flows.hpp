@@ -9,8 +9,8 @@
 #include <random>
 #include <string>
 
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/taylor/taylor.hpp"
 #include "taylor/long_double_events.hpp"
 
 namespace ricochet::test {

@@ -9,9 +9,9 @@
 #include <random>
 #include <vector>
 
-#include "ricochet/detail/series_root.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/taylor/detail/series_root.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::series_guard_test {
 namespace {

@@ -6,8 +6,8 @@
 #include <limits>
 #include <vector>
 
-#include "ricochet/detail/lazy_tape.hpp"
-#include "ricochet/detail/taylor_series.hpp"
+#include "ricochet/taylor/detail/lazy_tape.hpp"
+#include "ricochet/taylor/detail/taylor_series.hpp"
 #include "taylor/series_reference.hpp"
 
 namespace ricochet::taylor_series_test {

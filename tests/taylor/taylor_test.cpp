@@ -1,4 +1,4 @@
-#include "ricochet/taylor.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 
 namespace ricochet::taylor_test {

@@ -3,7 +3,7 @@
 // Base of the gates: delegates to the exact detector that a gate wraps.
 #pragma once
 
-#include "ricochet/detail/finding.hpp"
+#include "ricochet/finding.hpp"
 
 namespace ricochet::detail {
 

@@ -6,14 +6,14 @@
 #include <array>
 #include <vector>
 
+#include "ricochet/base/detail/owner.hpp"
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/meter.hpp"
-#include "ricochet/detail/owner.hpp"
 #include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/integrate/options.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/options.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::detail {
 

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <type_traits>
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

@@ -6,7 +6,7 @@
 // slowly, steps grow without regard to a guard that depends on time. One evaluation at an
 // offset that is no simple fraction of the interval is compared with the cubic through the
 // values and rates at its ends. An interval where they disagree is divided until they agree
-// (detail/resolved_parts.hpp).
+// (src/core/resolved_parts.hpp).
 #pragma once
 
 #include <array>

@@ -21,8 +21,8 @@
 #include <initializer_list>
 #include <type_traits>
 
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet::detail {
 

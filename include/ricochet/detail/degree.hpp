@@ -14,7 +14,7 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/counts.hpp"
 #include "ricochet/detail/scalar_probe.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail {
 

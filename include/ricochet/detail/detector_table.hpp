@@ -6,10 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "ricochet/detail/finding.hpp"
 #include "ricochet/detail/step_state.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/detect/step_probe.hpp"
+#include "ricochet/finding.hpp"
+#include "ricochet/planned.hpp"
+#include "ricochet/step_probe.hpp"
 
 namespace ricochet {
 

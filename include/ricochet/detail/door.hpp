@@ -10,12 +10,12 @@
 #include <string>
 #include <type_traits>
 
+#include "ricochet/bounds.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/guard_view.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/hybrid/bounds.hpp"
-#include "ricochet/hybrid/system.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/run.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet::detail {
 

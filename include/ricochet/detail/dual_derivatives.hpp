@@ -1,7 +1,7 @@
 // Internal: the declarations of this header may change without notice.
 //
 // Derivatives of flow and resets along a direction of state and time by dual numbers, for functions
-// that take any scalar (hybrid/guard.hpp).
+// that take any scalar (guard.hpp).
 #pragma once
 
 #include <array>
@@ -14,7 +14,7 @@
 #include "ricochet/detail/scalar_probe.hpp"
 #include "ricochet/detail/scratch.hpp"
 #include "ricochet/dual.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail {
 

@@ -9,7 +9,7 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/scalar_probe.hpp"
 #include "ricochet/dual.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail {
 

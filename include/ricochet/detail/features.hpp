@@ -16,7 +16,7 @@
 
 #include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/dual_derivatives.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet {
 

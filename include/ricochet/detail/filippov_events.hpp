@@ -2,7 +2,7 @@
 //
 // The guards, resets and time events that fields declare beside their switching surfaces, in the
 // forms of a system without modes. Fields are such a system but for its flow, which this header
-// adds, so that the concepts and calls of hybrid/system.hpp serve for both.
+// adds, so that the concepts and calls of system.hpp serve for both.
 #pragma once
 
 #include <concepts>
@@ -13,8 +13,8 @@
 #include "ricochet/detail/counts.hpp"
 #include "ricochet/detail/declarations.hpp"
 #include "ricochet/detail/guard_view.hpp"
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet::detail {
 

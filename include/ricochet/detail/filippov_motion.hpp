@@ -15,7 +15,7 @@
 #include "ricochet/detail/filippov_events.hpp"
 #include "ricochet/detail/filippov_rates.hpp"
 #include "ricochet/detail/scratch.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet {
 

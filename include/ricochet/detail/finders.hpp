@@ -9,8 +9,8 @@
 #include "ricochet/detail/detector_table.hpp"
 #include "ricochet/detail/door.hpp"
 #include "ricochet/detail/meter.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/locate/locators.hpp"
+#include "ricochet/locators.hpp"
+#include "ricochet/planned.hpp"
 
 namespace ricochet::detail {
 

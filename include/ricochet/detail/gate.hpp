@@ -14,11 +14,11 @@
 #include <optional>
 #include <string_view>
 
+#include "ricochet/base/detail/owner.hpp"
 #include "ricochet/detail/gate_features.hpp"
-#include "ricochet/detail/owner.hpp"
-#include "ricochet/hybrid/system.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet {
 

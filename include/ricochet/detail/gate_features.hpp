@@ -22,7 +22,7 @@
 #include <string_view>
 
 #include "ricochet/detail/components.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet {
 

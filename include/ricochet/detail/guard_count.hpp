@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet::detail {
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "ricochet/detail/components.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet {
 

@@ -5,7 +5,7 @@
 
 #include <cstddef>
 
-#include "ricochet/detail/instant.hpp"
+#include "ricochet/instant.hpp"
 
 namespace ricochet::detail {
 

@@ -25,7 +25,7 @@
 #include <limits>
 
 #include "ricochet/detail/arithmetic.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet {
 

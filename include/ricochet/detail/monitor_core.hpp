@@ -9,7 +9,7 @@
 
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/host_step.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "ricochet/options.hpp"
 
 namespace ricochet {
 

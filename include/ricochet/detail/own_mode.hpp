@@ -3,7 +3,7 @@
 // Modes of runs in phases: a mode of the system and, in the bits above it, the kind of phase.
 #pragma once
 
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "ricochet/detail/components.hpp"
-#include "ricochet/integrate/options.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/options.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet {
 
@@ -85,7 +85,7 @@ auto integrate(detail::AnySystemGiven, detail::AnyStartGiven, const detail::Miss
 {
     static_assert(detail::never<Choices...>,
                   "ricochet: found an option that there is not; expected t_end and others of "
-                  "ricochet::Options, in the order of integrate/options.hpp");
+                  "ricochet::Options, in the order of options.hpp");
     return Run<std::vector<double>>{};
 }
 

@@ -15,7 +15,7 @@
 #include <type_traits>
 
 #include "ricochet/detail/counts.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail {
 

@@ -12,8 +12,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "ricochet/base/detail/owner.hpp"
 #include "ricochet/detail/components.hpp"
-#include "ricochet/detail/owner.hpp"
 
 namespace ricochet::detail {
 

@@ -15,7 +15,7 @@
 
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/detail/guard_view.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
 
 namespace ricochet::detail {
 

@@ -19,9 +19,9 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/dense_polynomial.hpp"
 #include "ricochet/detail/host_step.hpp"
-#include "ricochet/detail/instant.hpp"
 #include "ricochet/detail/runge_kutta.hpp"
-#include "ricochet/hybrid/guard.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/instant.hpp"
 
 namespace ricochet::detail {
 

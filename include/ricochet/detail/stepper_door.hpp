@@ -11,7 +11,7 @@
 
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/door.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/methods.hpp"
 
 namespace ricochet::detail {
 

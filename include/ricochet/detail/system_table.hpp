@@ -16,9 +16,9 @@
 
 #include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/step_state.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/planned.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet::detail {
 

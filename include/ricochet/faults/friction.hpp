@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "ricochet/detail/parameters.hpp"
+#include "ricochet/faults/parameters.hpp"
 
 namespace ricochet {
 

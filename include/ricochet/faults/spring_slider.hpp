@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detail/variational_step.hpp"
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/faults/variational_step.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet {
 

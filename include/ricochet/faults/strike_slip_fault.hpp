@@ -13,11 +13,11 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detail/fault_stiffness.hpp"
-#include "ricochet/detail/parameters.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/faults/detail/fault_stiffness.hpp"
+#include "ricochet/faults/parameters.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet {
 

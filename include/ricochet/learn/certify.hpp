@@ -42,9 +42,9 @@
 #include <vector>
 
 #include "ricochet/detail/features.hpp"
-#include "ricochet/hybrid/system.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet {
 

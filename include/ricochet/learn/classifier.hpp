@@ -17,14 +17,14 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detail/adam.hpp"
-#include "ricochet/detail/assessment.hpp"
-#include "ricochet/detail/data_set.hpp"
+#include "ricochet/base/random.hpp"
 #include "ricochet/detail/gate.hpp"
-#include "ricochet/detail/random.hpp"
-#include "ricochet/detail/surface.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/learn/assessment.hpp"
+#include "ricochet/learn/data_set.hpp"
+#include "ricochet/learn/detail/adam.hpp"
+#include "ricochet/learn/detail/surface.hpp"
 #include "ricochet/nn/model.hpp"
+#include "ricochet/system.hpp"
 
 namespace ricochet::learn {
 

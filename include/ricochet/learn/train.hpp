@@ -14,12 +14,12 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/gate_runs.hpp"
-#include "ricochet/detail/surface.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/integrate.hpp"
 #include "ricochet/learn/classifier.hpp"
+#include "ricochet/learn/detail/gate_runs.hpp"
+#include "ricochet/learn/detail/surface.hpp"
 
 namespace ricochet::learn {
 

@@ -11,8 +11,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/detail/owner.hpp"
-#include "ricochet/detail/pack.hpp"
+#include "ricochet/base/detail/owner.hpp"
+#include "ricochet/nn/detail/pack.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet {

@@ -7,7 +7,7 @@
 //              nothing is held any more
 //
 // A mechanism is a value as time_stepping.hpp describes it. Beside that it may declare what any
-// hybrid system does (hybrid/system.hpp), for the state x = (q, v), an array: guards with resets,
+// hybrid system does (system.hpp), for the state x = (q, v), an array: guards with resets,
 // time events, and modes, if `force` takes one. They act in both kinds of phases.
 #pragma once
 
@@ -15,11 +15,11 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/contact_run.hpp"
-#include "ricochet/detail/free_flight.hpp"
-#include "ricochet/integrate/simulation.hpp"
+#include "ricochet/nonsmooth/detail/contact_run.hpp"
+#include "ricochet/nonsmooth/detail/free_flight.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/nonsmooth/time_stepping.hpp"
+#include "ricochet/simulation.hpp"
 
 namespace ricochet {
 

@@ -19,13 +19,13 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/given_inclusion.hpp"
-#include "ricochet/detail/hand_over_run.hpp"
-#include "ricochet/detail/inclusion_alone.hpp"
-#include "ricochet/detail/inclusion_sizes.hpp"
-#include "ricochet/detail/phased_run.hpp"
 #include "ricochet/detail/refused_calls.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/nonsmooth/detail/given_inclusion.hpp"
+#include "ricochet/nonsmooth/detail/inclusion_alone.hpp"
+#include "ricochet/nonsmooth/detail/inclusion_sizes.hpp"
+#include "ricochet/nonsmooth/detail/phased_run.hpp"
+#include "ricochet/nonsmooth/hand_over_run.hpp"
 
 namespace ricochet {
 

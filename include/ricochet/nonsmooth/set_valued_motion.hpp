@@ -15,12 +15,12 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/composite_step.hpp"
-#include "ricochet/detail/false_position.hpp"
-#include "ricochet/detail/inclusion_sizes.hpp"
-#include "ricochet/detail/padded_motion.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/nonsmooth/detail/composite_step.hpp"
+#include "ricochet/nonsmooth/detail/false_position.hpp"
+#include "ricochet/nonsmooth/detail/inclusion_sizes.hpp"
+#include "ricochet/nonsmooth/detail/padded_motion.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet {
 

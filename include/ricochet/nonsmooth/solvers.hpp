@@ -2,15 +2,15 @@
 //
 // RICOCHET_INCLUSIONS_OF(N, M, ) in one source, which includes this header, compiles them for
 // systems of exactly N components and M reactions; the sources with such a system have
-// RICOCHET_INCLUSIONS_OF(N, M, extern) before its first use (detail/inclusion_sizes.hpp).
+// RICOCHET_INCLUSIONS_OF(N, M, extern) before its first use (nonsmooth/detail/inclusion_sizes.hpp).
 #pragma once
 
 #include <memory>
 
-#include "ricochet/detail/branch_phases_of.hpp"
 #include "ricochet/detail/debug_checks.hpp"
-#include "ricochet/detail/inclusion_sizes.hpp"
-#include "ricochet/detail/minimal_selection.hpp"
+#include "ricochet/nonsmooth/detail/branch_phases_of.hpp"
+#include "ricochet/nonsmooth/detail/inclusion_sizes.hpp"
+#include "ricochet/nonsmooth/detail/minimal_selection.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 
 namespace ricochet::detail {

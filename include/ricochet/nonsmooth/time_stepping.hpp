@@ -37,9 +37,9 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/any_mechanism.hpp"
-#include "ricochet/detail/inclusion_sizes.hpp"
-#include "ricochet/detail/moreau_step.hpp"
+#include "ricochet/nonsmooth/detail/any_mechanism.hpp"
+#include "ricochet/nonsmooth/detail/inclusion_sizes.hpp"
+#include "ricochet/nonsmooth/detail/moreau_step.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 
 namespace ricochet {

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/run.hpp"
 #include "ricochet/scene/scene.hpp"
 
 namespace ricochet {

@@ -1,5 +1,5 @@
 // Hybrid systems as bodies of a scene, such as a pendulum or an arm: a flow, optional guards and
-// resets (hybrid/system.hpp), and discs that other bodies can hit. Besides its flow it declares
+// resets (system.hpp), and discs that other bodies can hit. Besides its flow it declares
 //
 //     shape_count                       number of its discs, a constant or a member
 //     shape_radius(k)                   [m] of disc k
@@ -24,8 +24,8 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/any_scene_system.hpp"
 #include "ricochet/monitor.hpp"
+#include "ricochet/scene/detail/any_scene_system.hpp"
 
 namespace ricochet {
 

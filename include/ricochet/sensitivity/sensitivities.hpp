@@ -13,11 +13,11 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/directions.hpp"
-#include "ricochet/detail/dual_parameter.hpp"
-#include "ricochet/detail/undefined.hpp"
-#include "ricochet/detail/variational.hpp"
-#include "ricochet/integrate/integrate.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/sensitivity/detail/directions.hpp"
+#include "ricochet/sensitivity/detail/dual_parameter.hpp"
+#include "ricochet/sensitivity/detail/undefined.hpp"
+#include "ricochet/sensitivity/variational.hpp"
 
 namespace ricochet {
 

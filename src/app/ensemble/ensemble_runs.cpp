@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../../files/read_file.hpp"
 #include "../input.hpp"
+#include "base/read_file.hpp"
 #include "ricochet/ensemble.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::app {
 

@@ -9,10 +9,10 @@
 #include <optional>
 #include <utility>
 
-#include "../../files/read_file.hpp"
 #include "../input.hpp"
 #include "../joined.hpp"
-#include "ricochet/detail/splitmix.hpp"
+#include "base/read_file.hpp"
+#include "ricochet/base/detail/splitmix.hpp"
 #include "ricochet/ensemble.hpp"
 
 namespace ricochet::app {

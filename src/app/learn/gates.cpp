@@ -7,7 +7,7 @@
 #include <string>
 
 #include "input.hpp"
-#include "ricochet/detail/gate_specs.hpp"
+#include "learn/gate_specs.hpp"
 
 namespace ricochet::app {
 

@@ -15,7 +15,7 @@
 #include "policy_advice.hpp"
 #include "progress_bar.hpp"
 #include "report.hpp"
-#include "ricochet/learn/policies.hpp"
+#include "ricochet/learn_steps/policies.hpp"
 #include "say.hpp"
 #include "step_environment.hpp"
 #include "timing.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "ricochet/detail/step_environment.hpp"
+#include "ricochet/learn_steps/step_environment.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::app {

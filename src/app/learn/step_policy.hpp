@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "ricochet/learn/step_control.hpp"
+#include "ricochet/learn_steps/step_control.hpp"
 
 namespace ricochet::app {
 

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "../settings.hpp"
-#include "ricochet/integrate/run.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::app {
 

@@ -10,16 +10,16 @@
 
 #include "../input.hpp"
 #include "../registry.hpp"
+#include "app/ballistic_line.hpp"
 #include "has_series.hpp"
-#include "ricochet/detail/ballistic_line.hpp"
+#include "ricochet/bernstein.hpp"
 #include "ricochet/detail/features.hpp"
-#include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/integrate/integrate.hpp"
-#include "ricochet/integrate/methods.hpp"
-#include "ricochet/locate/locators.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/locators.hpp"
+#include "ricochet/methods.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::app {
 

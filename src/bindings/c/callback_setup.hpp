@@ -7,14 +7,14 @@
 
 #include "bindings/c/callback_table.hpp"
 #include "bindings/c/options.hpp"
+#include "ricochet/bernstein.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/finders.hpp"
-#include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/gates.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/locate/locators.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/gates.hpp"
+#include "ricochet/locators.hpp"
 #include "ricochet/nn/model.hpp"
+#include "ricochet/planned.hpp"
 
 namespace ricochet::c {
 

@@ -12,9 +12,9 @@
 
 #include "bindings/c/error.hpp"
 #include "bindings/c/inclusion.hpp"
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/hybrid/system.hpp"
+#include "ricochet/guard.hpp"
 #include "ricochet/ricochet.h"
+#include "ricochet/system.hpp"
 
 namespace ricochet::c {
 

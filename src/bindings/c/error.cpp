@@ -8,7 +8,7 @@
 #include <new>
 #include <stdexcept>
 
-#include "core/out_of_turn.hpp"
+#include "base/out_of_turn.hpp"
 
 namespace ricochet::c {
 

@@ -5,7 +5,7 @@
 
 #include "bindings/c/callback_system.hpp"
 #include "bindings/c/structs.hpp"
-#include "ricochet/detail/phased_run.hpp"
+#include "ricochet/nonsmooth/detail/phased_run.hpp"
 
 namespace ricochet::c {
 

@@ -138,7 +138,8 @@ RunOptions read_options(const rc_options* given)
     if (run.method == RC_TAYLOR) {
         reader.refuse(
             "method: found RC_TAYLOR, whose power series need the flow as a formula, for "
-            "callbacks; expected RC_FEHLBERG78, or the system in C++ with ricochet/taylor.hpp");
+            "callbacks; expected RC_FEHLBERG78, or the system in C++ with "
+            "ricochet/taylor/taylor.hpp");
     }
     run.fixed_step = reader.flag("fixed_step", from.fixed_step);
     if (!run.fixed_step && (run.method == RC_RK4 || run.method == RC_EULER)) {

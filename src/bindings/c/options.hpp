@@ -4,8 +4,8 @@
 #include <string>
 
 #include "bindings/c/error.hpp"
-#include "ricochet/integrate/methods.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "ricochet/methods.hpp"
+#include "ricochet/options.hpp"
 
 namespace ricochet::c {
 

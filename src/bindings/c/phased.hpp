@@ -9,7 +9,7 @@
 #include "bindings/c/options.hpp"
 #include "bindings/c/results.hpp"
 #include "ricochet/detail/core.hpp"
-#include "ricochet/detail/phased_run.hpp"
+#include "ricochet/nonsmooth/detail/phased_run.hpp"
 
 namespace ricochet::c {
 

@@ -5,8 +5,8 @@
 #include <string_view>
 
 #include "bindings/c/error.hpp"
-#include "ricochet/hybrid/guard.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::c {
 

@@ -11,7 +11,7 @@
 #include "bindings/c/callback_system.hpp"
 #include "bindings/c/options.hpp"
 #include "bindings/c/results.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::c {
 

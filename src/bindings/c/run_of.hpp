@@ -14,7 +14,7 @@
 #include "bindings/c/phased.hpp"
 #include "bindings/c/run.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/integrate/methods.hpp"
+#include "ricochet/methods.hpp"
 
 namespace ricochet::c {
 

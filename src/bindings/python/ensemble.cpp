@@ -22,7 +22,7 @@
 #include "read_request.hpp"
 #include "ready.hpp"
 #include "ricochet/ensemble.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/run.hpp"
 #include "setup.hpp"
 
 namespace ricochet::python {

@@ -9,7 +9,7 @@
 
 #include "formula.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/taylor/taylor.hpp"
 #include "source.hpp"
 
 namespace ricochet::python {

@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "ricochet/detail/finders.hpp"
-#include "ricochet/detect/gates.hpp"
+#include "ricochet/gates.hpp"
 #include "setup.hpp"
 
 namespace ricochet::python {

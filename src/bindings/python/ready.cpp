@@ -12,14 +12,14 @@
 #include <type_traits>
 #include <utility>
 
-#include "ricochet/integrate/simulation.hpp"
+#include "ricochet/simulation.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 #include "ricochet/systems/pendulum.hpp"
 #include "ricochet/systems/stick_slip.hpp"
 #include "ricochet/systems/thermostat.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::python {
 

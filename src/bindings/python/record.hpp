@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "request.hpp"
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet::python {
 

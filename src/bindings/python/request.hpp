@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "ricochet/detail/core.hpp"
-#include "ricochet/integrate/methods.hpp"
-#include "ricochet/integrate/options.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/nn/model.hpp"
+#include "ricochet/options.hpp"
 
 namespace ricochet::python {
 

@@ -6,13 +6,13 @@
 #include <string>
 #include <utility>
 
+#include "ricochet/bernstein.hpp"
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detect/bernstein.hpp"
-#include "ricochet/detect/extremum.hpp"
-#include "ricochet/detect/planned.hpp"
-#include "ricochet/locate/locators.hpp"
-#include "ricochet/taylor.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/locators.hpp"
+#include "ricochet/planned.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::python {
 

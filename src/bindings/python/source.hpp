@@ -18,7 +18,7 @@
 #include "record.hpp"
 #include "request.hpp"
 #include "ricochet/detail/core.hpp"
-#include "ricochet/detail/phased_run.hpp"
+#include "ricochet/nonsmooth/detail/phased_run.hpp"
 
 namespace ricochet::python {
 

@@ -1,8 +1,8 @@
 // needs: learn
-#include <ricochet/detail/random.hpp>
-#include <ricochet/detail/step_environment.hpp>
+#include <ricochet/base/random.hpp>
 #include <ricochet/faults/strike_slip_fault.hpp>
-#include <ricochet/learn/policies.hpp>
+#include <ricochet/learn_steps/policies.hpp>
+#include <ricochet/learn_steps/step_environment.hpp>
 #include <ricochet/nn/model.hpp>
 
 using namespace ricochet;

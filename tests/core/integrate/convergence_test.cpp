@@ -1,0 +1,104 @@
+// The order of every method, kept through events.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "ricochet/extremum.hpp"
+#include "ricochet/integrate.hpp"
+#include "walled_oscillator.hpp"
+
+namespace ricochet::convergence_test {
+namespace {
+
+using test::WalledOscillator;
+
+/// Largest error of the impact times to t = 20, with steps of length h.
+template <class Method>
+double largest_error(double h)
+{
+    const WalledOscillator oscillator;
+    const auto exact = oscillator.impacts(20);
+    const auto run =
+        integrate(oscillator, {1.0, 0.0}, {.t_end = 20, .step = h}, FixedStep<Method>{}, Ends{});
+    EXPECT_EQ(run.events.size(), exact.size());
+    double worst = 0;
+    for (std::size_t i = 0; i < std::min(exact.size(), run.events.size()); ++i) {
+        worst = std::max(worst, std::abs(run.events[i].t - exact[i]));
+    }
+    return worst;
+}
+
+/// Observed order between steps h and h / 4. Both are small enough for the leading
+/// term to dominate and large enough for the error to stay above rounding, 1e-13;
+/// the next term changes the observed order by a few tenths.
+template <class Method>
+double observed_order(double h)
+{
+    return std::log2(largest_error<Method>(h) / largest_error<Method>(h / 4)) / 2;
+}
+
+TEST(Convergence, EulerKeepsOrderOneThroughEvents)
+{
+    EXPECT_NEAR(observed_order<Euler>(1e-3), 1, 0.1);
+}
+
+TEST(Convergence, Rk4KeepsOrderFourThroughEvents)
+{
+    EXPECT_NEAR(observed_order<Rk4>(0.05), 4, 0.25);
+}
+
+TEST(Convergence, CashKarpKeepsOrderFiveThroughEvents)
+{
+    EXPECT_NEAR(observed_order<CashKarp54>(0.1), 5, 0.25);
+}
+
+TEST(Convergence, Dopri5KeepsOrderFiveThroughEvents)
+{
+    EXPECT_NEAR(observed_order<Dopri5>(0.1), 5, 0.25);
+}
+
+TEST(Convergence, Fehlberg78KeepsOrderSevenAtLeastThroughEvents)
+{
+    // Odeint advances with the eighth-order weights.
+    EXPECT_GE(observed_order<Fehlberg78>(0.8), 7.75);
+}
+
+/// Error against tolerance: two decades of tolerance must give at least one of error.
+template <class Method>
+void expect_proportional()
+{
+    const WalledOscillator oscillator;
+    const auto exact = oscillator.impacts(20);
+    double previous = 1;
+    for (const double rtol : {1e-5, 1e-7, 1e-9, 1e-11}) {
+        const auto run =
+            integrate(oscillator, {1.0, 0.0}, {.t_end = 20, .rtol = rtol, .atol = rtol},
+                      ErrorControlled<Method>{});
+        ASSERT_EQ(run.events.size(), exact.size());
+        double worst = 0;
+        for (std::size_t i = 0; i < exact.size(); ++i) {
+            worst = std::max(worst, std::abs(run.events[i].t - exact[i]));
+        }
+        EXPECT_LT(worst, previous / 10) << "rtol " << rtol;
+        EXPECT_LT(worst, 100 * rtol);
+        previous = worst;
+    }
+}
+
+TEST(Convergence, ErrorFollowsToleranceWithDopri5)
+{
+    expect_proportional<Dopri5>();
+}
+TEST(Convergence, ErrorFollowsToleranceWithCashKarp)
+{
+    expect_proportional<CashKarp54>();
+}
+TEST(Convergence, ErrorFollowsToleranceWithFehlberg78)
+{
+    expect_proportional<Fehlberg78>();
+}
+
+}  // namespace
+}  // namespace ricochet::convergence_test
