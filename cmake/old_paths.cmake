@@ -1,0 +1,27 @@
+# Headers at former paths, which forward to those of today, by the component that each is installed with.
+set(ricochet_core_old_paths
+    include/ricochet/detect/bernstein.hpp
+    include/ricochet/detect/extremum.hpp
+    include/ricochet/detect/gates.hpp
+    include/ricochet/detect/planned.hpp
+    include/ricochet/detect/step_probe.hpp
+    include/ricochet/hybrid/bounds.hpp
+    include/ricochet/hybrid/filippov.hpp
+    include/ricochet/hybrid/guard.hpp
+    include/ricochet/hybrid/phase.hpp
+    include/ricochet/hybrid/stop.hpp
+    include/ricochet/hybrid/system.hpp
+    include/ricochet/hybrid/times.hpp
+    include/ricochet/integrate/integrate.hpp
+    include/ricochet/integrate/methods.hpp
+    include/ricochet/integrate/options.hpp
+    include/ricochet/integrate/run.hpp
+    include/ricochet/integrate/simulation.hpp
+    include/ricochet/locate/locators.hpp)
+set(ricochet_learn_steps_old_paths
+    include/ricochet/learn/policies.hpp
+    include/ricochet/learn/step_control.hpp
+    include/ricochet/learn/train_friction.hpp)
+set(ricochet_taylor_old_paths
+    include/ricochet/lanes.hpp
+    include/ricochet/taylor.hpp)

@@ -1,0 +1,6 @@
+// Deprecated: this path is dropped after the next release.
+#pragma once
+
+#pragma message("ricochet/learn/policies.hpp is now ricochet/learn_steps/policies.hpp")
+
+#include "ricochet/learn_steps/policies.hpp"

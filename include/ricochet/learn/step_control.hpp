@@ -1,0 +1,6 @@
+// Deprecated: this path is dropped after the next release.
+#pragma once
+
+#pragma message("ricochet/learn/step_control.hpp is now ricochet/learn_steps/step_control.hpp")
+
+#include "ricochet/learn_steps/step_control.hpp"
