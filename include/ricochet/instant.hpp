@@ -15,6 +15,7 @@ struct TwoSum {
     double remainder;
 };
 
+/// The sum of a and b with its rounding error, for finite values in any order.
 [[nodiscard]] constexpr TwoSum two_sum(double a, double b) noexcept
 {
     const double sum = a + b;

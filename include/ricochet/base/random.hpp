@@ -23,6 +23,7 @@ class Random {
 public:
     using State = std::array<std::uint64_t, 4>;
 
+    /// Starts the stream of a seed.
     explicit constexpr Random(std::uint64_t seed) noexcept
     {
         ricochet::detail::SplitMix words(seed);

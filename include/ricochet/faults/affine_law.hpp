@@ -42,8 +42,11 @@ public:
     [[nodiscard]] double xi_of_theta(double theta) const;
     [[nodiscard]] double theta_of_xi(double xi) const;
 
+    /// Ddag(v, xi) and its derivatives. @param v  [m/s]
     [[nodiscard]] RateStateJet rate_potential(double v, double xi) const;
+    /// D*(d) and its derivatives.
     [[nodiscard]] ScalarJet dual(double d, double /*xi*/ = 0) const { return {d * d / 2, d, 1}; }
+    /// D(xi') and its derivatives. @param rate  xi'
     [[nodiscard]] ScalarJet primal(double rate, double /*xi*/ = 0) const
     {
         return {rate * rate / 2, rate, 1};

@@ -42,6 +42,7 @@ struct IncrementalStart {
     double h = 0;                ///< length of the step [s]
 };
 
+/// J(x, xi), its gradient and its Hessian, for the step that begins at `start`.
 template <PotentialPair Pair>
 [[nodiscard]] IncrementalJet incremental_potential(const Pair& pair, const SpringBlock& block,
                                                    const IncrementalStart& start, double x,

@@ -35,6 +35,7 @@ concept LoadPath = requires(const Load& load, double t)
         } -> std::convertible_to<double>;
 };
 
+/// Counts and residuals of one step.
 struct StepReport {
     int iterations = 0;       ///< of all stages
     int most_iterations = 0;  ///< of one stage
@@ -42,6 +43,7 @@ struct StepReport {
     int not_convex = 0;       ///< number of stages that are not convex
     double residual = 0;      ///< largest of all stages
     SliderState error{};      ///< estimate, by a method of lower order (none for order 1)
+    /// Whether every stage has been solved.
     [[nodiscard]] bool solved() const noexcept { return unsolved == 0; }
 };
 

@@ -23,6 +23,7 @@
 
 namespace ricochet::learn {
 
+/// Reward of a step.
 enum class StepReward {
     /// The source's equation 7, with x = (h - h_min) / (h_max - h_min) of the step taken:
     ///
@@ -42,6 +43,7 @@ enum class StepScale {
     logarithmic,  ///< equal ratios
 };
 
+/// Rewards, steps and episodes of an environment.
 struct StepEnvironmentOptions {
     StepReward reward = StepReward::published;
     double alpha = 2;       ///< zero or positive
