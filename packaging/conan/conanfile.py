@@ -8,8 +8,8 @@ from conan.tools.build import check_min_cppstd
 from conan.tools.cmake import CMake, CMakeDeps, CMakeToolchain, cmake_layout
 from conan.tools.files import copy
 
-COMPONENTS = ("nonsmooth", "sensitivity", "scene", "faults", "learn", "c")
-STANDS_ON = {"faults": "nonsmooth", "learn": "faults"}
+COMPONENTS = ("nonsmooth", "sensitivity", "scene", "faults", "learn", "learn_steps", "c")
+STANDS_ON = {"faults": ["nonsmooth"], "learn_steps": ["learn", "faults"]}
 WITHOUT = ("PYTHON", "BUILD_APP", "BUILD_EXAMPLES", "BUILD_TESTS")
 
 
@@ -48,8 +48,9 @@ class Ricochet(ConanFile):
         if self.settings.os != "Linux":
             raise ConanInvalidConfiguration("ricochet is built on Linux, by g++ or clang")
         for component, needed in STANDS_ON.items():
-            if self.options.get_safe(component) and not self.options.get_safe(needed):
-                raise ConanInvalidConfiguration(f"ricochet: {component} needs {needed}")
+            missing = [other for other in needed if not self.options.get_safe(other)]
+            if self.options.get_safe(component) and missing:
+                raise ConanInvalidConfiguration(f"ricochet: {component} needs {' and '.join(missing)}")
 
     def generate(self):
         toolchain = CMakeToolchain(self)

@@ -40,7 +40,8 @@ done
 last=${!#}
 build_type=None
 consume "$last" "all components" -DCMAKE_PREFIX_PATH="$work/whole" \
-    -DRICOCHET_COMPONENTS="nonsmooth;sensitivity;scene;faults;learn;hosts" -- nonsmooth sensitivity scene faults learn
+    -DRICOCHET_COMPONENTS="taylor;nonsmooth;sensitivity;scene;faults;learn;learn_steps;hosts" \
+    -- taylor nonsmooth sensitivity scene faults learn learn_steps
 consume "$last" "add_subdirectory" -DRICOCHET_SOURCE="$source" -- consumer
 
 if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_PATH="$work/core" \
@@ -69,7 +70,7 @@ for package in libricochet-dev libricochet-c ricochet; do
 done
 echo "licences are installed"
 
-for room in learn faults hosts nonsmooth scene sensitivity systems/sliding_mode.hpp; do
+for room in learn learn_steps faults hosts nonsmooth scene sensitivity taylor systems/sliding_mode.hpp; do
     [ -e "$work/whole/include/ricochet/$room" ]
     [ ! -e "$work/core/include/ricochet/$room" ]
 done

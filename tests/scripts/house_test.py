@@ -32,9 +32,32 @@ class House(unittest.TestCase):
     def test_arrows_against_the_order_are_those_that_are_listed(self):
         against = [a for a in self.figures["arrows"] if not a["permitted"]]
         self.assertEqual(sum(a["includes"] for a in against), len(self.figures["against"]))
-        self.assertTrue(self.house.may("scene", "core") and self.house.may("learn", "nonsmooth"))
-        self.assertFalse(self.house.may("core", "scene") or self.house.may("faults", "learn"))
+        self.assertTrue(self.house.may("scene", "core") and self.house.may("learn_steps", "nonsmooth"))
+        self.assertFalse(self.house.may("core", "scene") or self.house.may("learn", "faults"))
         self.assertTrue(self.house.may("room of tomorrow", "core"))
+
+    def test_no_include_runs_against_the_order(self):
+        self.assertEqual(self.figures["against"], [])
+
+    def test_what_a_room_stands_on_comes_before_it(self):
+        rooms = list(self.house.STANDS_ON)
+        for room, others in self.house.STANDS_ON.items():
+            for other in others.split():
+                self.assertLess(rooms.index(other), rooms.index(room), room)
+
+    def test_no_room_includes_private_headers_of_another(self):
+        self.assertTrue(self.house.is_closed("scene", "src/core/engine.hpp", "core"))
+        self.assertFalse(self.house.is_closed("core", "src/core/engine.hpp", "core"))
+        self.assertFalse(self.house.is_closed("scene", "src/base/require.hpp", "base"))
+        self.assertEqual(self.figures["private"], [])
+
+    def test_every_door_is_used(self):
+        files = self.house.tracked()
+        uses = {(to, name.split("/")[1]) for name in files if name.startswith("src/")
+                for _, to in self.house.included(name, (ROOT / name).read_text(errors="replace"), files)}
+        for header, rooms in self.house.DOORS.items():
+            for room in rooms.split():
+                self.assertIn((header, room), uses)
 
     def test_lines_are_counted_as_what_they_hold(self):
         text = 'int a;  // code\n\n// comment\n/* comment\n\n   */ int b;\nconst char* c = "// code";\n'

@@ -5,6 +5,7 @@ vcpkg_check_features(OUT_FEATURE_OPTIONS FEATURE_OPTIONS
     FEATURES
         faults      RICOCHET_FAULTS
         learn       RICOCHET_LEARN
+        learn-steps RICOCHET_LEARN_STEPS
         nonsmooth   RICOCHET_NONSMOOTH
         scene       RICOCHET_SCENE
         sensitivity RICOCHET_SENSITIVITY

@@ -1,4 +1,4 @@
-// needs: learn
+// needs: learn_steps
 #include <ricochet/base/random.hpp>
 #include <ricochet/faults/strike_slip_fault.hpp>
 #include <ricochet/learn_steps/policies.hpp>

@@ -19,11 +19,13 @@ class Ricochet(CMakePackage):
     variant("sensitivity", default=False, description="Derivatives through events, periodic orbits")
     variant("scene", default=False, description="Scenes of many bodies")
     variant("faults", default=False, description="Rate-and-state friction, slider, strike-slip fault")
-    variant("learn", default=False, description="Training, certificates, policies")
+    variant("learn", default=False, description="Classifiers, gates, certificates")
+    variant("learn_steps", default=False, description="Policies that choose steps, reinforcement learning, laws of friction")
     variant("c", default=False, description="The interface for C, a shared library")
 
     conflicts("~nonsmooth", when="+faults")
-    conflicts("~faults", when="+learn")
+    conflicts("~faults", when="+learn_steps")
+    conflicts("~learn", when="+learn_steps")
     requires("%gcc@12:", "%clang@14:", policy="one_of")
 
     depends_on("c", type="build", when="+c")
@@ -35,7 +37,7 @@ class Ricochet(CMakePackage):
     depends_on("fmt@9:11")
 
     def cmake_args(self):
-        parts = ("nonsmooth", "sensitivity", "scene", "faults", "learn", "c")
+        parts = ("nonsmooth", "sensitivity", "scene", "faults", "learn", "learn_steps", "c")
         without = ("PYTHON", "BUILD_APP", "BUILD_EXAMPLES", "BUILD_TESTS")
         return [
             *(self.define_from_variant(f"RICOCHET_{part.upper()}", part) for part in parts),
