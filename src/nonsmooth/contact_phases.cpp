@@ -329,6 +329,11 @@ private:
     {
         if (phases.step > 0) return phases.step;
         const double span = options.t_end - options.t_start;
+        if (std::isinf(span)) {
+            throw std::invalid_argument(
+                "ContactMotion: found an infinite t_end and no step, which is then no thousandth "
+                "of the run; expected the length [s] of the steps in contact");
+        }
         return span > 0 ? 1e-3 * span : 1;
     }
     [[nodiscard]] Owner<AnyLoop<C>> begin(const C& x0, const Options& options)

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "base/require.hpp"
+#include "ricochet/detail/refusals.hpp"
 
 namespace ricochet {
 
@@ -28,6 +29,15 @@ HandOverOptions hand_over_options(const Options& options)
     out.max_steps = std::min(options.max_steps, out.max_steps);
     out.stall_steps = options.stall_steps;
     out.cancelled = options.cancelled;
+    if (std::isinf(options.t_end)) {
+        const bool limited = std::isfinite(options.h_max);
+        out.set_valued.step = limited ? options.h_max : options.step;
+        if (out.set_valued.step == 0) {
+            refuse(
+                "found an infinite t_end and no h_max beside set-valued motion, whose steps are "
+                "then no thousandth of the run; expected h_max, their length [s]");
+        }
+    }
     detail::check(out, refuse.who);
     return out;
 }
@@ -48,6 +58,8 @@ HandOverOptions inclusion_options(const Options& options)
     unused(options.event_rtol != unset.event_rtol, "event_rtol");
     unused(options.event_window != unset.event_window, "event_window");
     unused(options.check_inside != unset.check_inside, "check_inside");
+    const bool may_end = options.max_steps != unset.max_steps || options.cancelled != nullptr;
+    if (std::isinf(options.t_end) && !may_end) throw_endless(options.t_end);
     return hand_over_options(options);
 }
 
@@ -55,8 +67,8 @@ void check(const HandOverOptions& options, std::string_view who)
 {
     const Require require{who};
     require(std::isfinite(options.t_start), "t_start must be finite", options.t_start);
-    require(std::isfinite(options.t_end) && options.t_end >= options.t_start,
-            "t_end must be finite and no earlier than t_start", options.t_end);
+    require(options.t_end >= options.t_start, "t_end must be no earlier than t_start",
+            options.t_end);
     require(options.rtol >= 0 && options.rtol < 1, "rtol must lie in [0, 1)", options.rtol);
     require(options.atol >= 0 && std::isfinite(options.atol), "atol must be zero or positive",
             options.atol);
@@ -80,9 +92,20 @@ HandOverOptions completed(HandOverOptions options, bool locate)
 {
     check(options, "HandOverOptions");
     const double span = options.t_end - options.t_start;
-    options.set_valued.t_start = options.t_start;
-    options.set_valued.t_end = options.t_end;
-    if (options.set_valued.step == 0) options.set_valued.step = span > 0 ? 1e-3 * span : 1;
+    SetValuedOptions& steps = options.set_valued;
+    steps.t_start = options.t_start;
+    if (std::isinf(span)) {
+        if (steps.step == 0) {
+            throw std::invalid_argument(
+                "HandOverOptions: found an infinite t_end and no set_valued.step, which is then no "
+                "thousandth of the run; expected the length [s] of the set-valued steps");
+        }
+        if (steps.h_min == 0) steps.h_min = 1e-9 * steps.step;
+        steps.t_end = std::numeric_limits<double>::max();
+    } else {
+        if (steps.step == 0) steps.step = span > 0 ? 1e-3 * span : 1;
+        steps.t_end = options.t_end;
+    }
     options.set_valued.max_attempts = std::min(options.set_valued.max_attempts, options.max_steps);
     if (!locate) return options;
     options.set_valued.switches = Switches::located;

@@ -26,6 +26,8 @@ PhaseRules::PhaseRules(const BranchPhases& any, bool by_mode, const PhaseOptions
         numbers->assign(count_, 0);
     }
     flow_.assign(size_, 0);
+    const double span = options.t_end - options.t_start;
+    shortest_ = std::isinf(span) ? 1e-6 * options.step : 1e-9 * span;
     if (options.alone) stall_ = {options.t_start, options.t_end, options.alone->stall_steps};
     arrived_.assign(count_, false);
     observed_.assign(count_, 0);
@@ -59,7 +61,7 @@ double PhaseRules::fraction_of_held(BranchPhases& inclusion, Mode b, double t0, 
                                     double t1, const double* x1)
 {
     // Below that length the motion has no smoothness that steps could follow.
-    if (t1 - t0 <= 1e-9 * (options_.t_end - options_.t_start)) return 1;
+    if (t1 - t0 <= shortest_) return 1;
     const double fraction = inclusion.fraction_of_held(b, t0, x0, t1, x1);
     memory_.contradicts = fraction > 0 ? 0 : 1;
     return fraction > 0 ? fraction : 0.1;

@@ -391,6 +391,7 @@ private:
     bool begins_ = false;                   ///< no step has been taken since the start
     PhaseCause cause_ = PhaseCause::start;  ///< why the phase that was entered last began
     std::uint64_t steps_ = 0, implicit_steps_ = 0;
+    double shortest_ = 0;  ///< [s] steps below this length follow nothing that is smooth
     StallWatch stall_;  ///< of an inclusion alone
 };
 

@@ -41,15 +41,19 @@ private:
     [[nodiscard]] static PhaseOptions phase_options(const Options& options, bool error_controlled,
                                                     const std::optional<AloneOptions>& alone)
     {
+        PhaseOptions out{.t_start = options.t_start,
+                         .t_end = options.t_end,
+                         .rtol = options.rtol,
+                         .atol = options.atol,
+                         .alone = alone};
+        if (alone) {
+            out.step = alone->step;
+            return out;
+        }
         const HandOverOptions of = completed(options_of_phases(options), false);
-        return {.t_start = of.t_start,
-                .t_end = of.t_end,
-                .rtol = of.rtol,
-                .atol = of.atol,
-                .step = alone              ? alone->step
-                        : error_controlled ? of.set_valued.step
-                                           : options.step,
-                .alone = alone};
+        out.atol = of.atol;
+        out.step = error_controlled ? of.set_valued.step : options.step;
+        return out;
     }
 
     RunSetup<C> setup_;

@@ -224,8 +224,10 @@ inline constexpr bool nonsmooth_is_linked =
 
 /// Integrates a system with its inclusion.
 ///
-/// @throws std::invalid_argument as for other systems; also for a backward run and an infinite end,
-///         and for a start from which no reaction follows.
+/// Set-valued steps are a thousandth of the run long; where its end is infinite, `h_max`, or `step`.
+///
+/// @throws std::invalid_argument as for other systems; also for a backward run, for an infinite end
+///         without h_max and step, and for a start from which no reaction follows.
 template <class System, class X = typename System::State, class Stepping = ErrorControlled<Dopri5>,
           class Detector = Extremum, class Locator = Newton>
 requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>

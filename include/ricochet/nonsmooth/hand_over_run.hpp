@@ -19,6 +19,7 @@ namespace ricochet {
 /// Options of a hand-over: times, tolerances of both kinds of phases, and what ends the run.
 struct HandOverOptions {
     double t_start = 0;
+    /// Infinite where something else ends the run: `max_steps`, `cancelled`, `until_released`.
     double t_end = std::numeric_limits<double>::quiet_NaN();
 
     /// Options of the event-driven phases, as in `Options`.
@@ -35,7 +36,7 @@ struct HandOverOptions {
     bool until_released = false;
 
     /// Options of the set-valued phases; times are those of the run, a step of 0 is a thousandth of
-    /// it. Changes are located for boxes of up to four reactions; for others see `switches`.
+    /// it, which an infinite run does not have. Changes are located for boxes of up to four reactions; for others see `switches`.
     SetValuedOptions set_valued{.step = 0, .scheme = {.first_stage = FirstStage::switch_aware}};
 
     std::vector<double> sample_times{};     ///< ascending
@@ -72,7 +73,7 @@ struct RICOCHET_ALIGNED HandOverRun {
 
 /// Converts the options of `integrate`.
 /// @throws std::invalid_argument for invalid options, and for those that a hand-over does not
-/// support: `stop_at_event`, `record_steps`, a run backward.
+/// support: `stop_at_event`, `record_steps`, a run backward, an infinite one without `h_max`.
 [[nodiscard]] HandOverOptions hand_over_options(const Options& options);
 
 namespace detail {
