@@ -864,13 +864,11 @@ void PhasedSystem<C>::make_phases()
         return me.verdict(of, end.mode, end.t, x);
     };
     t.reason = [](void* door) { return std::string_view(at(door).rules_.reason()); };
-    if (!rules_.options().alone) {
-        t.reaction = [](void* door, const PhasePlace<C>& at, std::vector<double>& r) {
-            PhasedSystem& me = PhasedSystem::at(door);
-            me.in(own_mode(at.mode))
-                .reaction(kind_of(at.mode), {at.t0, at.x0.data(), at.s, at.t, at.x.data()}, r);
-        };
-    }
+    t.reaction = [](void* door, const PhasePlace<C>& at, std::vector<double>& r) {
+        PhasedSystem& me = PhasedSystem::at(door);
+        me.in(own_mode(at.mode))
+            .reaction(kind_of(at.mode), {at.t0, at.x0.data(), at.s, at.t, at.x.data()}, r);
+    };
     t.list_in = [](void* door, std::vector<MotionPhase>& phases) {
         at(door).rules_.list_in(phases);
     };

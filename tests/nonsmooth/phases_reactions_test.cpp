@@ -10,6 +10,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "phased_runs.hpp"
@@ -118,6 +119,81 @@ TEST(Reactions, OfADiscPointAgainstItsSpeed)
 {
     const auto run = integrate(Disc{}, Two{0.6, 0.8}, sampled(2, {0, 0.5, 1.5}));
     expect_rows(run, {{-0.6, -0.8}, {-0.6, -0.8}, {0, 0}});
+}
+
+// --- of an inclusion alone ---
+
+template <class System>
+void expect_reactions(const System& system, const StateOf<System>& w0, std::vector<double> times,
+                      const std::vector<Row>& expected)
+{
+    const double t_end = times.back();
+    const auto run = hand_over(system, w0, {.t_end = t_end, .sample_times = std::move(times)});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.trajectory.t.size(), expected.size());
+    ASSERT_EQ(run.reactions.size(), expected.size());
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+        SCOPED_TRACE(run.trajectory.t[k]);
+        const auto& r = run.reactions[k];
+        expect_row(Row(r.data(), r.data() + r.size()), expected[k]);
+    }
+}
+
+/// w' = t - 3 Sgn w, as a set without branches.
+struct GrowingLoadBySteps {
+    static constexpr int state_size = 1, reaction_size = 1;
+    using Vector = Eigen::Matrix<double, 1, 1>;
+    static void smooth(double t, const Vector&, Vector& f) { f[0] = t; }
+    static sets::Ball<1> reaction_set(double, const Vector&) { return sets::Ball<1>(3); }
+};
+
+TEST(Reactions, OfAnInclusionAloneAreThoseOfItsSamples)
+{
+    const auto times = std::vector{0.0, 0.1, 0.2, 2.05, 3.5, 6.0};
+    const std::vector<Row> expected{{-3}, {-3}, {-0.2}, {-2.05}, {-3}, {-3}};
+    const Slider<1> system = under_growing_load();
+    expect_reactions(system.set_valued(), GrowingLoadBySteps::Vector(0.5), times, expected);
+    expect_reactions(GrowingLoadBySteps{}, GrowingLoadBySteps::Vector(0.5), times, expected);
+}
+
+/// Five contacts, of which the last has the bounds 3 and the others 1, hold one body under the load
+/// t.
+struct FiveContacts {
+    static constexpr int state_size = Eigen::Dynamic, reaction_size = Eigen::Dynamic;
+
+    struct Friction {
+        [[nodiscard]] static std::size_t dimension() { return 5; }
+        [[nodiscard]] static double lower(std::size_t i) { return -upper(i); }
+        [[nodiscard]] static double upper(std::size_t i) { return i == 4 ? 3 : 1; }
+        void project(std::span<const double> z, std::span<double> p) const
+        {
+            detail::clamp(*this, z, p);
+        }
+        void derivative(std::span<const double> z, std::span<double> d) const
+        {
+            detail::clamp_derivative(*this, z, d);
+        }
+    };
+    [[nodiscard]] static int size() { return 1; }
+    [[nodiscard]] static int reactions() { return 5; }
+    static void smooth(double t, const Eigen::VectorXd&, Eigen::VectorXd& f)
+    {
+        f.setConstant(1, t);
+    }
+    static void observe(Eigen::MatrixXd& e) { e.setOnes(5, 1); }
+    static void act(Eigen::MatrixXd& g) { g.setOnes(1, 5); }
+    [[nodiscard]] static Friction reaction_set(double, const Eigen::VectorXd&) { return {}; }
+};
+
+TEST(Reactions, OfAnInclusionAloneThatDependOnOneAnotherAreTheLeast)
+{
+    expect_reactions(TwoContacts::Motion{}, TwoContacts::Motion::Vector(0.0), {0, 1, 2, 3, 3.5, 5},
+                     {{0, 0}, {-0.5, -0.5}, {-1, -1}, {-1, -2}, {-1, -2.5}, {-1, -3}});
+    expect_reactions(FiveContacts{}, Eigen::VectorXd::Zero(1), {0, 1, 6, 8},
+                     {{0, 0, 0, 0, 0},
+                      {-0.2, -0.2, -0.2, -0.2, -0.2},
+                      {-1, -1, -1, -1, -2},
+                      {-1, -1, -1, -1, -3}});
 }
 
 // --- modes without an inclusion, and states without a reaction ---

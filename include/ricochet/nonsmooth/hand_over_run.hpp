@@ -36,7 +36,8 @@ struct HandOverOptions {
     bool until_released = false;
 
     /// Options of the set-valued phases; times are those of the run, a step of 0 is a thousandth of
-    /// it, which an infinite run does not have. Changes are located for boxes of up to four reactions; for others see `switches`.
+    /// it, which an infinite run does not have. Changes are located for boxes of up to four
+    /// reactions; for others see `switches`.
     SetValuedOptions set_valued{.step = 0, .scheme = {.first_stage = FirstStage::switch_aware}};
 
     std::vector<double> sample_times{};     ///< ascending
@@ -67,6 +68,8 @@ struct RICOCHET_ALIGNED HandOverRun {
     std::vector<Event<Vector>> events;
     std::vector<MotionPhase> phases;
     Trajectory<Vector> trajectory;  ///< at the sample times
+    /// At the sample times, after the events there: of all with the same effect the least.
+    std::vector<ReactionOf<System>> reactions;
     HandOverStatistics statistics;
     StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
 };

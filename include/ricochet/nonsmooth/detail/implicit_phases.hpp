@@ -217,7 +217,7 @@ public:
             probe_ = from_;
         }
         if (probe_.w.allFinite()) {
-            choose_least(probe_);
+            least_.choose(matrices(), probe_);
         } else {
             probe_.reaction.setConstant(std::numeric_limits<double>::quiet_NaN());
         }
@@ -436,28 +436,6 @@ protected:
         }
     }
 
-    /// Replaces the reaction by the least of all with the same effect that satisfy the law, for
-    /// boxes of at most 64.
-    void choose_least(State& at)
-    {
-        const auto& m = matrices();
-        if (!decides_at_zero() || m.own_reactions() > 64) return;
-        if (!knows_least_) {
-            least_ = LeastReaction<M>(m.act(), m.own_reactions());
-            knows_least_ = true;
-        }
-        if (!least_.depend()) return;
-        Reaction lower = at.reaction, upper = at.reaction, y, s;
-        m.inclusion().bounds(at.t, at.w, lower, upper);
-        m.observed(at.t, at.w, y);
-        m.offset(at.t, s);
-        const Reaction terms = times(m.observe().cwiseAbs(), at.w.cwiseAbs()) + s.cwiseAbs();
-        for (Eigen::Index i = 0; i < y.size(); ++i) {
-            if (std::abs(y[i]) > 1e-12 * terms[i]) lower[i] = upper[i] = at.reaction[i];
-        }
-        least_.choose(lower, upper, at.reaction);
-    }
-
     BranchPhasesOptions options_;
     AnyStep<N, M> step_;
     Eigen::Index own_size_;
@@ -466,8 +444,7 @@ protected:
     Vector error_;      ///< of the last step
     std::uint64_t attempts_ = 0, stages_ = 0;
     StageReport failure_;
-    LeastReaction<M> least_;
-    bool knows_least_ = false;
+    LeastOfState<M> least_;
 
 private:
     /// How far the set reaches along axis i, in the direction of `sign`.

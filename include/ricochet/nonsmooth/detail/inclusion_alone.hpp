@@ -20,6 +20,7 @@
 #include "ricochet/nonsmooth/detail/stall_watch.hpp"
 #include "ricochet/nonsmooth/hand_over_run.hpp"
 #include "ricochet/simulation.hpp"
+#include "ricochet/detail/least_reaction.hpp"
 
 namespace ricochet::detail {
 
@@ -91,6 +92,9 @@ public:
         out.failure = done.failure;
         out.trajectory.t = done.trajectory.t;
         for (const C& x : done.trajectory.x) out.trajectory.x.push_back(vector(x));
+        for (const std::vector<double>& r : done.reactions) {
+            out.reactions.push_back(Eigen::Map<const ReactionOf<System>>(r.data()));
+        }
         out.events.reserve(done.events.size());
         for (std::size_t k = 0; k < done.events.size(); ++k) {
             out.events.push_back(shown(done.events[k], end.changes[k]));
@@ -150,7 +154,7 @@ private:
 /// An inclusion without branches, in solvers of N components and M reactions.
 template <class System, int N, int M>
 class RunBySteps {
-    static constexpr int n = state_size<System>;
+    static constexpr int n = state_size<System>, m = reaction_size<System>;
     using Motion = AnyMotion<N, M>;
     using State = typename Motion::State;
 
@@ -177,7 +181,7 @@ public:
         run_.outcome = options_.events_only ? Outcome::not_handed_over : Outcome::running;
         if (run_.outcome == Outcome::running) emit_samples(true);
         while (run_.outcome == Outcome::running) advance();
-        run_.state = resized<n, reaction_size<System>>(motion_.state());
+        run_.state = resized<n, m>(motion_.state());
         run_.statistics.set_valued = motion_.statistics();
         run_.statistics.set_valued_time = run_.state.t - from;
         return std::move(run_);
@@ -236,13 +240,18 @@ private:
             const bool inside = !at_start && t > before.t && t < now.t &&
                                 motion_.stepper().take(before, t - before.t, sample_).converged;
             run_.trajectory.t.push_back(t);
-            run_.trajectory.x.push_back(resized<n>(inside ? sample_.w : now.w));
+            if (!inside) sample_ = now;
+            least_.choose(motion_.matrices(), sample_);
+            const auto shown = resized<n, m>(sample_);
+            run_.trajectory.x.push_back(shown.w);
+            run_.reactions.push_back(shown.reaction);
         }
     }
 
     HandOverOptions options_;
     Motion motion_;
     State sample_;
+    LeastOfState<M> least_;
     HandOverRun<System> run_;
     StallWatch stall_{options_.t_start, options_.t_end, options_.stall_steps};
 };

@@ -120,4 +120,37 @@ private:
     bool depend_ = false;
 };
 
+/// The least of all reactions of a state with the same effect that satisfy its law.
+template <int M>
+class RICOCHET_ALIGNED LeastOfState {
+public:
+    /// Replaces the reaction of a state, for boxes of at most 64.
+    template <class Matrices, class State>
+    void choose(const Matrices& m, State& at)
+    {
+        if (!m.traits().box || !m.traits().of_reactions() || m.own_reactions() > 64) return;
+        if (!is_known_) {
+            least_ = LeastReaction<M>(m.act(), m.own_reactions());
+            is_known_ = true;
+        }
+        if (!least_.depend()) return;
+        typename LeastReaction<M>::Reaction lower = at.reaction, upper = at.reaction, y, s;
+        m.inclusion().bounds(at.t, at.w, lower, upper);
+        m.observed(at.t, at.w, y);
+        m.offset(at.t, s);
+        for (Eigen::Index i = 0; i < y.size(); ++i) {
+            double terms = std::abs(s[i]);
+            for (Eigen::Index c = 0; c < at.w.size(); ++c) {
+                terms += std::abs(m.observe()(i, c) * at.w[c]);
+            }
+            if (std::abs(y[i]) > 1e-12 * terms) lower[i] = upper[i] = at.reaction[i];
+        }
+        least_.choose(lower, upper, at.reaction);
+    }
+
+private:
+    LeastReaction<M> least_;
+    bool is_known_ = false;
+};
+
 }  // namespace ricochet::detail
