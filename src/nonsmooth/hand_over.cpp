@@ -118,6 +118,21 @@ HandOverOptions completed(HandOverOptions options, bool locate)
     return options;
 }
 
+HandOverOptions with_part_of_steps(HandOverOptions options, bool locate, double part)
+{
+    SetValuedOptions& steps = options.set_valued;
+    steps.step = part * completed(options, locate).set_valued.step;
+    if (!std::holds_alternative<ConstantStep>(steps.controller)) {
+        steps.rtol *= part * part;
+        steps.atol *= part * part;
+        for (ErrorField& field : steps.fields) field.rtol *= part * part;
+    }
+    constexpr std::uint64_t most = std::numeric_limits<std::uint64_t>::max();
+    options.max_steps = options.max_steps <= most / 16 ? 16 * options.max_steps : most;
+    options.estimate_error = false;
+    return options;
+}
+
 std::optional<PhaseCause> cause_after(Outcome outcome) noexcept
 {
     switch (outcome) {

@@ -11,6 +11,7 @@
 // time events, and modes, if `force` takes one. They act in both kinds of phases.
 #pragma once
 
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -41,6 +42,8 @@ struct ContactRun : Run<typename FreeFlight<System>::State> {
     std::vector<ContactForces> forces;  ///< at the sample times, of the steps that hold them
     ContactStatistics statistics;       ///< in place of the counts of all steps together
     ContactReport failure;  ///< set with `not_converged`, and with `non_finite` in contact
+    /// With `HandOverOptions::estimate_error`.
+    std::optional<EstimatedError<typename FreeFlight<System>::State>> error;
 };
 
 namespace detail {
@@ -202,7 +205,17 @@ template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
                                            const HandOverOptions& options,
                                            const Stepping& /*stepping*/ = {})
 {
-    return ContactMotion<System, Stepping>(system, q, v, options).take();
+    ContactRun<System> run = ContactMotion<System, Stepping>(system, q, v, options).take();
+    if (!options.estimate_error) return run;
+    const auto with_part = [&](double part) {
+        const auto finer = detail::with_part_of_steps(options, false, part);
+        return ContactMotion<System, Stepping>(system, q, v, finer).take();
+    };
+    run.error = detail::estimated_error(run, with_part, [](const ContactRun<System>& of) {
+        using X = typename FreeFlight<System>::State;
+        return detail::ComparedRun<X>{of.outcome, of.x, of.trajectory.x};
+    });
+    return run;
 }
 
 }  // namespace ricochet

@@ -68,7 +68,16 @@ template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
                                             const HandOverOptions& options,
                                             const Stepping& /*stepping*/ = {})
 {
-    return HandOver<System, Stepping>(system, w0, options).take();
+    HandOverRun<System> run = HandOver<System, Stepping>(system, w0, options).take();
+    if (!options.estimate_error) return run;
+    const auto with_part = [&](double part) {
+        const auto finer = detail::with_part_of_steps(options, Branching<System>, part);
+        return HandOver<System, Stepping>(system, w0, finer).take();
+    };
+    run.error = detail::estimated_error(run, with_part, [](const HandOverRun<System>& of) {
+        return detail::ComparedRun<StateOf<System>>{of.outcome, of.state.w, of.trajectory.x};
+    });
+    return run;
 }
 
 /// Rejects, with a sentence at compile time, a system that is not an inclusion; never called.
@@ -224,7 +233,8 @@ inline constexpr bool nonsmooth_is_linked =
 
 /// Integrates a system with its inclusion.
 ///
-/// Set-valued steps are a thousandth of the run long; where its end is infinite, `h_max`, or `step`.
+/// Set-valued steps are a thousandth of the run long; where its end is infinite, `h_max`, or
+/// `step`.
 ///
 /// @throws std::invalid_argument as for other systems; also for a backward run, for an infinite end
 ///         without h_max and step, and for a start from which no reaction follows.

@@ -9,6 +9,10 @@
 #include <vector>
 
 #include "ricochet/guard.hpp"
+#include "ricochet/hybrid/phase.hpp"
+#include "ricochet/integrate/options.hpp"
+#include "ricochet/integrate/run.hpp"
+#include "ricochet/nonsmooth/estimated_error.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/options.hpp"
 #include "ricochet/phase.hpp"
@@ -46,6 +50,11 @@ struct HandOverOptions {
     /// its span; 0: never.
     std::uint64_t stall_steps = 1'000'000;
     const std::atomic<bool>* cancelled = nullptr;
+
+    /// Whether two more runs with a shorter `set_valued.step` tell the error of the run:
+    /// `HandOverRun::error`, `ContactRun::error`. Six times the work; by `hand_over` alone, not by
+    /// a `ContactMotion`.
+    bool estimate_error = false;
 };
 
 /// Work of a hand-over, by the kind of phase.
@@ -72,6 +81,8 @@ struct RICOCHET_ALIGNED HandOverRun {
     std::vector<ReactionOf<System>> reactions;
     HandOverStatistics statistics;
     StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
+    /// With `HandOverOptions::estimate_error`.
+    std::optional<EstimatedError<Vector>> error;
 };
 
 /// Converts the options of `integrate`.
@@ -90,6 +101,9 @@ void check(const HandOverOptions& options, std::string_view who);
 /// The options with defaults filled in.
 /// @throws std::invalid_argument naming the option.
 [[nodiscard]] HandOverOptions completed(HandOverOptions options, bool locate);
+/// The options of a run with a part of the steps; a controller has that part of its tolerances,
+/// squared.
+[[nodiscard]] HandOverOptions with_part_of_steps(HandOverOptions options, bool locate, double part);
 /// Cause of the set-valued phase after an event-driven one with this outcome; nothing if the run is
 /// over.
 [[nodiscard]] std::optional<PhaseCause> cause_after(Outcome outcome) noexcept;
