@@ -506,10 +506,23 @@ bool PhaseRules::is_flow(double t, const double* x, const double* rate)
     }
     if (largest <= 1e-6 * size) return true;
     reason_ = fmt::format(
-        "where a y arrives at zero, at t = {}, the flow gives component {} the rate {}, and the "
-        "inclusion {}",
-        t, off, rate[off], there);
+        "where {}, at t = {}, the flow gives component {} the rate {}, and the inclusion {}",
+        begins_ ? "the inclusion decides at the start" : "a y arrives at zero", t, off, rate[off],
+        there);
     return false;
+}
+
+bool PhaseRules::is_flow_at_start(double t, const double* x, const double* rate)
+{
+    if (!has_inclusion() || !inclusion().has_branches()) return true;
+    inclusion().observe(t, x, y_.data());
+    for (std::size_t i = 0; i < count(); ++i) {
+        if (!(std::fabs(y_[i]) > 1e-3 * inclusion().size_of_row(i, x))) return true;
+    }
+    std::fill(arrived_.begin(), arrived_.end(), true);
+    const bool same = is_flow(t, x, rate);
+    forget_changes();
+    return same;
 }
 
 void PhaseRules::note_changes(const Set& set, Mode before, Kind next, const double* x)

@@ -182,6 +182,9 @@ public:
     [[nodiscard]] bool step_back(double t, double* x);
     /// Whether the flow of the system at (t, x), on that side, is that of the inclusion.
     [[nodiscard]] bool is_flow(double t, const double* x, const double* rate);
+    /// The same at a start from which the inclusion decides, where every y is farther from zero
+    /// than a thousandth of what it reads: whatever the tolerances are.
+    [[nodiscard]] bool is_flow_at_start(double t, const double* x, const double* rate);
     [[nodiscard]] Kind end_as_violated() { return end_with(Outcome::law_violated); }
     [[nodiscard]] std::span<const ReactionChange> changes() const noexcept { return changes_; }
     /// Whether a guard of the system has an event of its own in the last set.
@@ -392,7 +395,7 @@ private:
     PhaseCause cause_ = PhaseCause::start;  ///< why the phase that was entered last began
     std::uint64_t steps_ = 0, implicit_steps_ = 0;
     double shortest_ = 0;  ///< [s] steps below this length follow nothing that is smooth
-    StallWatch stall_;  ///< of an inclusion alone
+    StallWatch stall_;     ///< of an inclusion alone
 };
 
 }  // namespace ricochet::detail

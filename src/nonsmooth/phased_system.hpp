@@ -81,7 +81,10 @@ public:
         const std::size_t modes = own_.moded ? own_.mode_count(user_.door) : 1;
         if (modes > 0 && mode >= modes) throw_unknown_mode("integrate", mode, modes);
         mode_ = mode;
-        return with(in(mode).enter(t, x.data()), mode);
+        const Kind kind = in(mode).enter(t, x.data());
+        const bool is_examined = kind != PhaseRules::own && !by_mode_ && !rules_.options().alone;
+        if (!is_examined || agrees_at_start(mode, t, x)) return with(kind, mode);
+        return with(rules_.end_as_violated(), mode);
     }
 
 private:
@@ -339,6 +342,8 @@ private:
     [[nodiscard]] Mode decide(const PhaseSet<C>& set, C& after);
     /// The kind of phase after a set that leaves the inclusion as it is.
     [[nodiscard]] Kind decide_kind(const PhaseSet<C>& set, C& after);
+    /// Whether the flow of the user is that of the inclusion where a run starts.
+    [[nodiscard]] bool agrees_at_start(Mode mode, double t, const C& x);
     /// Whether the user's flow is that of the inclusion where reactions of a set have arrived.
     [[nodiscard]] bool agrees(const PhaseSet<C>& set);
     /// Calls the reset of the changes of a set.
@@ -646,6 +651,14 @@ bool PhasedSystem<C>::agrees(const PhaseSet<C>& set)
     C rate = x;
     if (!own_.flow(user_.door, own_mode(set.before), set.t, x, rate)) return true;
     return rules_.is_flow(set.t, x.data(), rate.data());
+}
+
+template <class C>
+bool PhasedSystem<C>::agrees_at_start(Mode mode, double t, const C& x)
+{
+    C rate = x;
+    if (!own_.flow(user_.door, mode, t, x, rate)) return true;
+    return rules_.is_flow_at_start(t, x.data(), rate.data());
 }
 
 template <class C>

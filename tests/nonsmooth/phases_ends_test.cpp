@@ -169,6 +169,21 @@ TEST(PhasesEnds, AFlowThatIsNotThatOfTheInclusionEndsTheRunWhereItTakesOver)
         << run.reason;
 }
 
+TEST(PhasesEnds, AFlowThatIsNotThatOfTheInclusionIsSeenAtTheStartWhateverTheTolerance)
+{
+    // At rtol 1e-3 no y counts as clear of zero, and the flow is never followed.
+    const Forgetful system{{.f = [](double, const One&, One& dxdt) { dxdt[0] = 0; }}};
+    const Options loose{.t_end = 3, .rtol = 1e-3, .atol = 1e-6};
+    const auto run = run_of(system, One{1}, loose);
+    EXPECT_EQ(run.outcome, Outcome::law_violated);
+    EXPECT_EQ(run.t, 0);
+    EXPECT_EQ(run.reason,
+              "where the inclusion decides at the start, at t = 0, the flow gives component 0 the "
+              "rate -0.5, and the inclusion -1");
+    const Slider<1> fine{.f = [](double, const One&, One& dxdt) { dxdt[0] = 0; }};
+    expect_end(run_of(fine, One{1}, loose), One{0});
+}
+
 TEST(PhasesEnds, ABalanceOfLoadAndFrictionIsNoContradiction)
 {
     // It slides with a rate of 1e-9, the difference of two terms of size 1.
