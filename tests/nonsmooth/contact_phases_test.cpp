@@ -300,23 +300,25 @@ TEST(ContactPhases, AGuardEndsTheRunInContact)
 TEST(ContactPhases, AGuardEndsARunWithoutAnEndOfItsOwn)
 {
     constexpr double infinity = std::numeric_limits<double>::infinity();
-    const auto run = hand_over(Ended{}, {0, 0}, {1.5, 0},
-                               {.t_end = infinity, .set_valued = {.step = 1e-2}});
+    const auto run =
+        hand_over(Ended{}, {0, 0}, {1.5, 0}, {.t_end = infinity, .set_valued = {.step = 1e-2}});
     EXPECT_EQ(run.outcome, Outcome::stopped_by_event);
     EXPECT_NEAR(run.t, 0.5, 1e-9);
     ContactMotion<Ended> driven({}, {0, 0}, {1.5, 0}, Options{.t_end = infinity}, 1e-2);
     while (driven.step()) {
     }
     EXPECT_NEAR(driven.t(), 0.5, 1e-9);
-    EXPECT_EQ(refusal([&] { (void)hand_over(Ended{}, {0, 0}, {1.5, 0}, {.t_end = infinity}); }),
+    EXPECT_EQ(refusal([&] {
+                  (void)hand_over(Ended{}, {0, 0}, {1.5, 0}, {.t_end = infinity});
+              }),
               "HandOverOptions: found an infinite t_end and no set_valued.step, which is then no "
               "thousandth of the run; expected the length [s] of the set-valued steps");
-    EXPECT_EQ(refusal([&] {
-                  const ContactMotion<Ended> endless({}, {0, 0}, {1.5, 0},
-                                                     Options{.t_end = infinity}, 0);
-              }),
-              "ContactMotion: found an infinite t_end and no step, which is then no thousandth of "
-              "the run; expected the length [s] of the steps in contact");
+    EXPECT_EQ(
+        refusal([&] {
+            const ContactMotion<Ended> endless({}, {0, 0}, {1.5, 0}, Options{.t_end = infinity}, 0);
+        }),
+        "ContactMotion: found an infinite t_end and no step, which is then no thousandth of "
+        "the run; expected the length [s] of the steps in contact");
 }
 
 /// A ball of its own above the puck's floor, whose impacts the system describes by a guard.

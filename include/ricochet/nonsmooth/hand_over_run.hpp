@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "ricochet/guard.hpp"
-#include "ricochet/hybrid/phase.hpp"
-#include "ricochet/integrate/options.hpp"
 #include "ricochet/integrate/run.hpp"
 #include "ricochet/nonsmooth/estimated_error.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"

@@ -15,12 +15,12 @@
 
 #include "ricochet/nonsmooth/detail/branch_modes.hpp"
 #include "ricochet/nonsmooth/detail/law.hpp"
+#include "ricochet/nonsmooth/detail/least_reaction.hpp"
 #include "ricochet/nonsmooth/detail/padded_motion.hpp"
 #include "ricochet/nonsmooth/detail/phased_run.hpp"
 #include "ricochet/nonsmooth/detail/stall_watch.hpp"
 #include "ricochet/nonsmooth/hand_over_run.hpp"
 #include "ricochet/simulation.hpp"
-#include "ricochet/detail/least_reaction.hpp"
 
 namespace ricochet::detail {
 

@@ -11,8 +11,8 @@
 #include <type_traits>
 
 #include "ricochet/detail/declarations.hpp"
-#include "ricochet/nonsmooth/detail/linear_cases.hpp"
 #include "ricochet/guard.hpp"
+#include "ricochet/nonsmooth/detail/linear_cases.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
 
 namespace ricochet::detail {

@@ -8,8 +8,8 @@
 
 namespace ricochet::detail {
 
-/// Whether a number of steps in a row advances a run by less than 1e-9 of its span; of a run without
-/// end by less than 1e-6 of the time that it has covered.
+/// Whether a number of steps in a row advances a run by less than 1e-9 of its span; of a run
+/// without end by less than 1e-6 of the time that it has covered.
 class StallWatch {
 public:
     StallWatch() = default;
