@@ -13,7 +13,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "ricochet/integrate/run.hpp"
+#include "ricochet/run.hpp"
 
 namespace ricochet {
 

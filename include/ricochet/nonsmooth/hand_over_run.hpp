@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "ricochet/guard.hpp"
-#include "ricochet/integrate/run.hpp"
 #include "ricochet/nonsmooth/estimated_error.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/options.hpp"
