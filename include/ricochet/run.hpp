@@ -366,7 +366,7 @@ struct WrongBound {
     State x{};                 ///< state at that time
     double value = 0;          ///< value of the guard there
     double since = 0;          ///< [s] time of its last check; t for a bound on the value
-    double value_then = 0;     ///< value of the guard at that check
+    double value_then = 0;     ///< value of the guard at that check, or the bound that stood for it
     double allowed = 0;        ///< the bound, or the largest change allowed since that check
 };
 

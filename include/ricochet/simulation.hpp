@@ -457,10 +457,10 @@ public:
         return goes_on;
     }
 
-    /// Advances to the end. Calls `observe(event)` for every recorded event that `advance` and
-    /// `step` have not shown, those at the start included, and `observe(simulation)` after every
-    /// step, each if `observe` accepts it. Both
-    /// see only final results: with the second, no detector looks ahead.
+    /// Advances to the end. Calls `observe(event)` for every recorded event that `advance` has not
+    /// shown, those at the start and in the last `step` included, and `observe(simulation)` after
+    /// every step, each if `observe` accepts it. Both see only final results: with the second, no
+    /// detector looks ahead.
     template <class Observer>
     void run_to_end(Observer&& observe)
     {

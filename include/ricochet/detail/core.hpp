@@ -62,7 +62,7 @@ public:
     virtual bool advance() = 0;
     /// Skips everything that `advance` has not shown yet.
     virtual void show_all() noexcept = 0;
-    /// Number of events, of those recorded, that `advance` and `step` have shown.
+    /// Number of events, of those recorded, that `advance` has shown.
     [[nodiscard]] virtual std::size_t shown_events() const noexcept = 0;
     /// Takes one step, which may belong to an interval that is closed later if it looks ahead.
     virtual void advance_once(bool look_ahead) = 0;
