@@ -15,7 +15,7 @@ fi
     { echo "skipped: pip could not fetch NumPy, SciPy, pybind11 and pytest"; exit 77; }
 "$venv" -m pip list --disable-pip-version-check
 
-for component in core nonsmooth; do
+for component in core taylor nonsmooth; do
     "$cmake" --install "$build" --component "$component" --prefix "$room/core" >/dev/null
 done
 # Not optimised: what the module does is tested, not how fast it is.
