@@ -198,10 +198,19 @@ class Ensemble:
     rows: NDArray[Any]
     failures: dict[int, str]
     complete: bool
+    inputs: dict[str, NDArray[Any]]
+    event_table: Optional[NDArray[np.void]]
+    guard_names: list[str]
+    modes: Optional[list]
+    times: Optional[Floats]
+    states: Optional[Floats]
+    def to_pandas(self, events: bool = False) -> Any: ...
+    def to_xarray(self) -> Any: ...
     def __len__(self) -> int: ...
     def __getattr__(self, name: str) -> NDArray[Any]: ...
 
-def ensemble(system: Union[_Ready, type[_Ready]], table: Any, t_end: float, *,
+def ensemble(system: Union[System, _Ready, Callable[..., Union[System, _Ready]]], table: Any,
+             t_end: float, *, parameters: Any = None,
              columns: Optional[Sequence[str]] = None, x0: Optional[ArrayLike] = None,
              threads: Optional[int] = None, executor: Any = None,
              progress: Optional[Callable[[int, int], Any]] = None, mode: Any = None,

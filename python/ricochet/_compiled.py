@@ -36,6 +36,10 @@ class Compiled:
         if self._ricochet_address == 0:
             raise ValueError("Compiled: found a null pointer, expected a function")
 
+    def __reduce__(self):
+        raise TypeError("Compiled: found one to be copied to another process, in which its address "
+                        "means nothing; expected it to be made there")
+
     def __repr__(self):
         return f"Compiled(0x{self._ricochet_address:x})"
 

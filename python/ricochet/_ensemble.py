@@ -1,34 +1,58 @@
-"""Ensembles: a ready system for every row of a table."""
+"""Ensembles: one run for every row of a table."""
 
 import numpy as np
 
 from . import _ricochet
 from ._network import set_gate
 from ._ready import Ready
+from ._rows import COUNTS as _COUNTS
+from ._rows import run_rows
 from ._run import number_from, numbers_from, set_mode, set_tolerance
+from ._system import System
 
-_COUNTS = ("events", "steps", "rejected", "flow_calls", "guard_calls")
 _BLOCK = 256  # number of rows submitted to an executor at a time
 
 
 class Ensemble:
     """Results of an ensemble, row by row.
 
-    rows : ndarray
-        A structured array with the fields ``outcome``, ``t``, ``x`` (the final state), ``mode``,
-        ``events`` (how many), ``steps``, ``rejected``, ``flow_calls`` and ``guard_calls``. A field
-        is also an attribute. ``outcome`` is ``"failed"`` for a row whose run raised an exception,
-        and empty for a row that was not run.
+    rows : ndarray, shape (rows,)
+        A structured array with the fields ``outcome``, ``t``, ``x`` (the final state), ``mode`` (its
+        number), ``events`` (how many), ``steps``, ``rejected``, ``flow_calls`` and ``guard_calls``. A
+        field is also an attribute. ``outcome`` is ``"failed"`` for a row whose run raised an
+        exception, and empty for a row that was not run.
     failures : dict
         The message of every row that failed.
     complete : bool
         Whether all rows were run.
+    inputs : dict of ndarray
+        The columns of the table, or of ``parameters``, by name.
+
+    And of own systems:
+
+    event_table : ndarray, shape (events of all runs,)
+        A structured array with the fields of `Run.events` and, first, ``row``, in the order of rows
+        and times; None for ready systems, whose events are counted.
+    guard_names, modes : list
+        What the numbers in ``guard``, ``mode``, ``mode_before`` and ``mode_after`` mean, in the first
+        row that was run; ``modes`` is None where they have no names.
+    times, states : ndarray, shapes (times,) and (rows, times, components)
+        The ``sample_times`` and the states there; NaN after the end of a run. None without them.
+
+    States that are shorter than others end in NaN.
     """
 
-    def __init__(self, rows, failures, complete):
+    def __init__(self, rows, failures, complete, *, inputs=None, event_table=None, guard_names=(),
+                 modes=None, times=None, states=None):
         self.rows = rows
         self.failures = failures
         self.complete = complete
+        self.inputs = inputs or {}
+        self.event_table = event_table
+        self.guard_names = list(guard_names)
+        self.modes = modes
+        self.times = times
+        self.states = states
 
     def __len__(self):
         return len(self.rows)
@@ -43,6 +67,83 @@ class Ensemble:
         names, counts = np.unique(self.rows["outcome"], return_counts=True)
         ends = ", ".join(f"{count} {name or 'not run'}" for name, count in zip(names, counts))
         return f"<Ensemble of {len(self)}: {ends}>"
+
+    def _named(self, numbers):
+        """Modes by name where they have names."""
+        if self.modes is None:
+            return numbers
+        return np.array([str(getattr(mode, "name", mode)) for mode in self.modes])[numbers]
+
+    def _columns(self, table, numbers):
+        """The fields of a table as columns, a component of a state each."""
+        columns = {}
+        for name in table.dtype.names:
+            field = table[name]
+            if name in numbers:
+                field = self._named(field)
+            if field.ndim == 1:
+                columns[name] = field
+            else:
+                columns.update({f"{name}[{i}]": field[:, i] for i in range(field.shape[1])})
+        return columns
+
+    def to_pandas(self, events=False):
+        """The rows as a ``pandas.DataFrame``, the columns of `inputs` before those of `rows`.
+
+        The final state has a column for each component, ``x[0]``, ``x[1]`` and so on, and modes
+        have their names. With ``events=True`` the frame is that of `event_table`. ImportError
+        where pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("Ensemble.to_pandas needs pandas, which was not found") from None
+        if events:
+            self._need_events()
+            columns = self._columns(self.event_table, ("mode_before", "mode_after"))
+            return pandas.DataFrame(columns)
+        columns = self._columns(self.rows, ("mode",))
+        inputs = {name if name not in columns else f"{name} (given)": values
+                  for name, values in self.inputs.items()}
+        return pandas.DataFrame({**inputs, **columns},
+                                index=pandas.RangeIndex(len(self), name="row"))
+
+    def to_xarray(self):
+        """The results as an ``xarray.Dataset``.
+
+        Dimensions are ``row``, ``component``, with ``sample_times`` ``time``, and of own systems
+        ``event``, whose variables begin with ``event_``; `inputs` are coordinates of ``row``.
+        ImportError where xarray is not installed.
+        """
+        try:
+            import xarray
+        except ImportError:
+            raise ImportError("Ensemble.to_xarray needs xarray, which was not found") from None
+        variables = {}
+        for name in self.rows.dtype.names:
+            field = self._named(self.rows[name]) if name == "mode" else self.rows[name]
+            variables[name] = (("row", "component")[:field.ndim], field)
+        if self.states is not None:
+            variables["states"] = (("row", "time", "component"), self.states)
+        if self.event_table is not None:
+            axes = {"bracket": "side"}
+            for name in self.event_table.dtype.names:
+                field = self.event_table[name]
+                field = self._named(field) if name in ("mode_before", "mode_after") else field
+                axis = ("event", axes.get(name, "component"))
+                variables[f"event_{name}"] = (axis[:field.ndim], field)
+        coordinates = {"row": np.arange(len(self))}
+        if self.times is not None:
+            coordinates["time"] = self.times
+        for name, values in self.inputs.items():
+            taken = name in variables or name in coordinates or name in ("component", "event")
+            coordinates[f"{name} (given)" if taken else name] = ("row", values)
+        return xarray.Dataset(variables, coordinates)
+
+    def _need_events(self):
+        if self.event_table is None:
+            raise ValueError("events: found an ensemble of ready systems, which counts them; "
+                             "expected one with parameters, or of a System")
 
 
 def _columns_of(table, columns):
@@ -151,48 +252,56 @@ def _run_by(executor, arguments, options, progress):
     return _joined([*parts, Ensemble(rest, {}, False)], [*begins[:len(parts)], 0])
 
 
-def ensemble(system, table, t_end, *, columns=None, x0=None, threads=None, executor=None,
-             progress=None, mode=None, **options):
-    """Integrates a ready system for every row of a table, on all cores.
+def ensemble(system, table, t_end, *, parameters=None, columns=None, x0=None, threads=None,
+             executor=None, progress=None, mode=None, **options):
+    """Integrates a system for every row of a table.
+
+    A ready system runs on all cores, without the interpreter. A system of one's own is run by
+    `integrate` row by row; its events are kept.
 
     Parameters
     ----------
-    system : a ready system, or its class
-        Gives the parameters that are not columns of the table.
+    system : a ready system, or its class; a `System`, or a function that makes one
+        A ready system gives the parameters that are not columns of the table. A function, such as
+        the class of a system, is called for each row of ``parameters``; it may return a ready
+        system, too.
     table : dict of arrays, structured array, or array_like of shape (rows, columns)
-        Columns are parameters of the system or components of its initial state.
+        For a ready system: columns are parameters or components of the initial state. For others:
+        the initial states, shape (rows, components), or with ``parameters`` also one for all rows.
     t_end : float
+    parameters : dict of arrays, structured array, or array_like of shape (rows,) or (rows, columns)
+        Arguments of ``system``, by name or, in an array without fields, by position.
     columns : sequence of str
-        The names of the columns of an array without fields.
+        Of a ready system, the names of the columns of an array without fields.
     x0 : array_like
-        The initial state of components that are not columns; by default ``system.start``.
+        Of a ready system, the initial state of components that are not columns; by default
+        ``system.start``.
     threads : int
-        By default one for each core that the process may use. The results do not depend on it.
+        By default one for each core that the process may use, and one for systems of one's own,
+        whose threads take turns in the interpreter unless all functions are `Compiled`. The
+        results do not depend on it.
     executor
         If given, blocks of rows are submitted to it: an executor of `concurrent.futures` or
-        `mpi4py.futures`, or a client of `dask.distributed`. The results are the same.
+        `mpi4py.futures`, or a client of `dask.distributed`. The results are the same. To other
+        processes a system must be sent, so for a process pool its class or functions stand at the
+        top level of an importable module.
     progress : callable
         Called regularly with the number of finished rows and the number of rows; if it returns
         False, the ensemble ends with the results so far.
     mode
         Initial mode of all rows.
     **options
-        As for `integrate`, except for options that record results along the way: events are only
-        counted.
+        As for `integrate`, except for ``record_steps``, and for ready systems except for all
+        options that record results along the way.
 
     Returns
     -------
     Ensemble
+
+    A row whose run raises an exception, also in a function of the system, has the outcome
+    ``"failed"`` and a message that names it; the other rows are run. TypeError or ValueError for
+    arguments with which no row can be run.
     """
-    if isinstance(system, type) and issubclass(system, Ready):
-        system = system()
-    if not isinstance(system, Ready):
-        raise TypeError(f"system: found a {type(system).__name__}, expected a ready system or its "
-                        "class")
-    for option in ("record_steps", "record_events", "event_states", "sample_times", "dense"):
-        if option in options:
-            raise TypeError(f"{option}: found in an ensemble, which keeps the ends of its runs; "
-                            "expected it in integrate")
     if threads is not None and (isinstance(threads, bool) or not isinstance(threads, int)
                                 or not 1 <= threads <= 1024):
         raise ValueError(f"threads: found {threads!r}, expected a whole number from 1 to 1024")
@@ -200,18 +309,49 @@ def ensemble(system, table, t_end, *, columns=None, x0=None, threads=None, execu
         raise TypeError("threads: found together with an executor, which has its own")
     if executor is not None and not callable(getattr(executor, "submit", None)):
         raise TypeError(f"executor: found a {type(executor).__name__}, expected one with submit()")
-    parameters, starts = _tables(system, _columns_of(table, columns), x0)
-    options["t_end"] = number_from(t_end, "t_end")
     if mode is not None:
         options["mode"] = mode
-        set_mode(options, system, None)
+    is_ready = isinstance(system, Ready) or isinstance(system, type) and issubclass(system, Ready)
+    if isinstance(system, System) or callable(system) and (not is_ready or parameters is not None):
+        for name, given in (("columns", columns), ("x0", x0)):
+            if given is not None:
+                raise TypeError(f"{name}: found some for a system that is not a ready one, expected "
+                                "initial states and parameters")
+        return Ensemble(**run_rows(system, table, t_end, parameters, threads, executor, progress,
+                                   options))
+    return _of_ready(system, table, t_end, parameters, columns, x0, threads, executor, progress,
+                     options)
+
+
+def _of_ready(system, table, t_end, parameters, columns, x0, threads, executor, progress, options):
+    if isinstance(system, type) and issubclass(system, Ready):
+        system = system()
+    if not isinstance(system, Ready):
+        raise TypeError(f"system: found a {type(system).__name__}, expected a System, a function "
+                        "that makes one, or a ready system or its class")
+    if parameters is not None:
+        raise TypeError("parameters: found some beside a ready system that is made already, "
+                        "expected its class, or the parameters in the table")
+    for option in ("record_steps", "record_events", "event_states", "sample_times", "dense"):
+        if option in options:
+            raise TypeError(f"{option}: found in an ensemble of a ready system, which keeps the "
+                            "ends of its runs; expected it in integrate, or in an ensemble with "
+                            "parameters")
+    found = _columns_of(table, columns)
+    parameters, starts = _tables(system, found, x0)
+    options["t_end"] = number_from(t_end, "t_end")
+    set_mode(options, system, None)
     if not isinstance(options.get("atol", 0), (float, int)):
         set_tolerance(options, options["atol"], starts.shape[1])
     names = [name.replace("_", "-") for name in system.parameters]
     arguments = (system._name, names, parameters, starts)
     if executor is not None and len(starts) > 0:
-        return _run_by(executor, arguments, options, progress)
-    return _run(*arguments, options, threads or 0, progress)
+        out = _run_by(executor, arguments, options, progress)
+    else:
+        out = _run(*arguments, options, threads or 0, progress)
+    out.inputs = found
+    out.modes = None if system.modes is None else list(system.modes)
+    return out
 
 
 def row_seed(seed, index):

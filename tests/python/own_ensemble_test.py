@@ -1,0 +1,281 @@
+"""Ensembles of systems written in Python, in this process and by executors."""
+
+import concurrent.futures
+import multiprocessing
+import pickle
+
+import numpy as np
+import pytest
+
+import ricochet
+
+
+class Ball(ricochet.System):
+    """A ball under gravity on a floor."""
+
+    def __init__(self, restitution=0.9, gravity=9.81):
+        super().__init__()
+        self.bounciness = restitution
+        self.pull = gravity
+
+    def flow(self, t, x):
+        return [x[1], -self.pull]
+
+    @ricochet.guard(unilateral=True)
+    def floor(self, t, x):
+        return x[0]
+
+    @floor.reset
+    def floor(self, t, x):
+        if self.bounciness > 1:
+            raise ArithmeticError(f"a ball of restitution {self.bounciness:.17g}")
+        return [0.0, -self.bounciness * x[1]]
+
+
+class Room(ricochet.System):
+    """A thermostat, whose state loses its clock when the heater goes on."""
+
+    modes = ("off", "on")
+    changes_dimension = True
+
+    def flow(self, mode, t, x):
+        return [-1.0, 1.0] if mode == "off" else [1.0]
+
+    @ricochet.guard(in_modes=["off"])
+    def cold(self, mode, t, x):
+        return x[0] - 18
+
+    @cold.reset
+    def cold(self, mode, t, x):
+        return "on", x[:1]
+
+
+def drops(rows=50):
+    random = np.random.default_rng(1)
+    starts = np.column_stack([random.uniform(1, 10, rows), np.zeros(rows)])
+    return starts, {"restitution": random.uniform(0.7, 0.9, rows)}
+
+
+def content(found):
+    return pickle.dumps([found.rows.tobytes(), found.event_table.tobytes(), found.failures,
+                         found.complete, found.guard_names,
+                         None if found.states is None else found.states.tobytes()])
+
+
+def test_rows_are_runs_of_integrate():
+    starts, parameters = drops()
+    balls = ricochet.ensemble(Ball, starts, 3.0, parameters=parameters)
+    assert balls.complete and not balls.failures and len(balls) == 50
+    assert balls.guard_names == ["floor"] and balls.states is None
+    for i in (0, 15, 16, 49):
+        run = ricochet.integrate(Ball(parameters["restitution"][i]), starts[i], 3.0)
+        assert (balls.outcome[i], balls.t[i], balls.mode[i]) == (run.outcome, run.t, 0)
+        assert balls.x[i].tobytes() == run.x.tobytes()
+        assert balls.events[i] == len(run.events) and balls.steps[i] == run.statistics.steps
+        events = balls.event_table[balls.event_table["row"] == i]
+        for name in run.events.dtype.names:
+            assert np.array_equal(events[name], run.events[name]), name
+    assert np.all(np.diff(balls.event_table["row"]) >= 0)
+    assert "50 reached_end" in repr(balls)
+
+
+def test_they_are_the_runs_of_the_ready_system():
+    starts, parameters = drops()
+    ready = ricochet.ensemble(ricochet.BouncingBall, {"height": starts[:, 0], **parameters}, 3.0)
+    assert ready.event_table is None
+    kept = ricochet.ensemble(ricochet.BouncingBall, starts, 3.0, parameters=parameters)
+    assert kept.rows.tobytes() == ready.rows.tobytes()
+    assert len(kept.event_table) == ready.events.sum()
+
+
+def test_systems_parameters_and_starts_are_given_in_several_forms():
+    starts, parameters = drops()
+    expected = content(ricochet.ensemble(Ball, starts, 3.0, parameters=parameters))
+    fields = np.array(list(zip(parameters["restitution"])), [("restitution", float)])
+    for given in (fields, parameters["restitution"], parameters["restitution"][:, None],
+                  np.column_stack([parameters["restitution"], np.full(50, 9.81)])):
+        assert content(ricochet.ensemble(Ball, starts, 3.0, parameters=given)) == expected
+    one = ricochet.ensemble(Ball, starts[0], 3.0, parameters=parameters)
+    each = ricochet.ensemble(Ball, np.tile(starts[0], (50, 1)), 3.0, parameters=parameters)
+    assert content(one) == content(each)
+    made = ricochet.ensemble(Ball(0.8), starts, 3.0)
+    assert content(made) == content(ricochet.ensemble(lambda: Ball(0.8), starts.tolist(), 3.0))
+
+
+def executors():
+    yield concurrent.futures.ThreadPoolExecutor(3)
+    for processes in (1, 2):
+        yield concurrent.futures.ProcessPoolExecutor(processes, multiprocessing.get_context("fork"))
+
+
+def test_the_bits_depend_neither_on_executors_nor_on_workers():
+    starts, parameters = drops()
+    parameters["restitution"][[7, 40]] = 1.5
+    given = dict(parameters=parameters, sample_times=np.linspace(0, 3, 7))
+    expected = content(ricochet.ensemble(Ball, starts, 3.0, **given))
+    for threads in (1, 2, 4):
+        assert content(ricochet.ensemble(Ball, starts, 3.0, threads=threads, **given)) == expected
+    for executor in executors():
+        with executor:
+            found = ricochet.ensemble(Ball, starts, 3.0, executor=executor, **given)
+        assert content(found) == expected
+
+
+def test_a_cluster_of_dask_gives_the_same_bits():
+    distributed = pytest.importorskip("distributed")
+    starts, parameters = drops()
+    expected = content(ricochet.ensemble(Ball, starts, 3.0, parameters=parameters))
+    with distributed.LocalCluster(2, processes=True, threads_per_worker=1,
+                                  dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            found = ricochet.ensemble(Ball, starts, 3.0, parameters=parameters, executor=client)
+            assert content(found) == expected
+            # Functions that no pool of processes takes.
+            found = ricochet.ensemble(lambda restitution: Ball(restitution), starts, 3.0,
+                                      parameters=parameters, executor=client)
+            assert content(found) == expected
+
+
+def test_a_row_that_fails_is_a_row():
+    starts, parameters = drops()
+    parameters["restitution"][33] = 1.5
+    for options in ({}, {"executor": concurrent.futures.ThreadPoolExecutor(2)}):
+        balls = ricochet.ensemble(Ball, starts, 3.0, parameters=parameters, **options)
+        assert balls.complete and list(balls.failures) == [33]
+        said = balls.failures[33]
+        first = np.sqrt(2 * starts[33, 0] / 9.81)
+        assert said.startswith("row 33: ArithmeticError: a ball of restitution 1.5 (after t = ")
+        assert 0 < float(said.rpartition(" ")[2][:-1]) <= first  # the end of the step before
+        assert balls.outcome[33] == "failed" and np.isnan(balls.x[33]).all()
+        assert not (balls.event_table["row"] == 33).any()
+    # One that cannot be made, one that cannot start, and one that goes to infinity.
+    made = ricochet.ensemble(lambda restitution: 1 / restitution and Ball(restitution),
+                             [1.0, 0.0], 1.0, parameters=[0.5, 0.0])
+    assert list(made.failures) == [1] and "row 1: ZeroDivisionError" in made.failures[1]
+    begun = ricochet.ensemble(Ball(), [[1.0, 0.0], [-1.0, 0.0]], 1.0)
+    assert list(begun.failures) == [1] and "row 1: ValueError: integrate: " in begun.failures[1]
+    with np.errstate(over="ignore"):
+        grown = ricochet.ensemble(ricochet.System(lambda t, x: x * x), [[0.0], [1.0]], 2.0)
+    assert grown.outcome[0] == "reached_end" and not grown.failures
+    assert grown.outcome[1] not in ("reached_end", "failed")
+
+
+def test_states_of_other_lengths_end_in_nan():
+    rooms = ricochet.ensemble(Room(), [[20.0, 0.0], [30.0, 0.0]], 4.0, mode="off",
+                              sample_times=[0, 1, 4])
+    assert rooms.modes == ["off", "on"] and rooms.mode.tolist() == [1, 0]
+    np.testing.assert_allclose(rooms.x, [[20.0, np.nan], [26.0, 4.0]])
+    np.testing.assert_allclose(rooms.states[0], [[20, 0], [19, 1], [20, np.nan]])
+    assert np.isnan(rooms.event_table["after"][0]).tolist() == [False, True]
+
+
+def test_samples_after_the_end_of_a_run_are_nan():
+    stops = ricochet.System(lambda t, x: [-1.0], [ricochet.Guard(lambda t, x: x[0], stop_after=1)])
+    found = ricochet.ensemble(stops, [[1.5], [9.0]], 3.0, sample_times=[0, 1, 2, 3])
+    np.testing.assert_allclose(found.states[:, :, 0], [[1.5, 0.5, np.nan, np.nan], [9, 8, 7, 6]])
+    assert found.outcome.tolist() == ["stopped_by_event", "reached_end"]
+
+
+def test_progress_is_shown_and_stops():
+    starts, parameters = drops()
+    seen = []
+    ricochet.ensemble(Ball, starts, 1.0, parameters=parameters,
+                      progress=lambda done, rows: seen.append((done, rows)))
+    assert seen == [(16, 50), (32, 50), (48, 50), (50, 50)]
+    for options in ({}, {"threads": 2}):
+        balls = ricochet.ensemble(Ball, starts, 1.0, parameters=parameters,
+                                  progress=lambda done, rows: False, **options)
+        assert not balls.complete and (balls.outcome[:16] == "reached_end").all()
+        assert (balls.outcome[16:] == "").all() and np.isnan(balls.t[16:]).all()
+
+
+def test_an_interrupt_of_a_function_arrives():
+    def interrupts(t, x):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        ricochet.ensemble(ricochet.System(interrupts), [[1.0]], 1.0)
+
+
+def test_no_rows_are_an_ensemble():
+    balls = ricochet.ensemble(Ball(), np.empty((0, 2)), 1.0)
+    assert balls.complete and len(balls) == 0
+
+
+def test_a_process_pool_says_what_it_cannot_send():
+    class Local(Ball):
+        pass
+
+    for system in (ricochet.System(lambda t, x: -x), Local()):
+        refused_by_a_process_pool(system)
+
+
+def refused_by_a_process_pool(system):
+    with concurrent.futures.ProcessPoolExecutor(1, multiprocessing.get_context("fork")) as executor:
+        with pytest.raises(TypeError, match="cannot be sent to another process .*top level"):
+            ricochet.ensemble(system, [[1.0, 2.0]], 1.0, executor=executor)
+
+
+def test_compiled_functions_are_not_sent_to_other_processes():
+    with pytest.raises(TypeError, match="address"):
+        pickle.dumps(ricochet.Compiled(4096))
+
+
+@pytest.mark.parametrize("arguments, options, error, said", [
+    ((Ball(), [[1.0, 2.0]], 1.0), {"parameters": [1.0]}, TypeError, "parameters: .*its class"),
+    ((Ball, [[1.0, 2.0]], 1.0), {"parameters": [1.0, 2.0]}, ValueError, "found 2 rows, expected 1"),
+    ((Ball, [[1.0, 2.0]], 1.0), {"parameters": {"a": [1.0], "b": [1.0, 2.0]}}, ValueError, "length"),
+    ((Ball(), [1.0, 2.0], 1.0), {}, ValueError, r"starts: found shape \(2,\)"),
+    ((Ball(), [[1.0, 2.0]], 1.0), {"columns": ["a"]}, TypeError, "columns"),
+    ((Ball(), [[1.0, 2.0]], 1.0), {"rtoll": 1}, TypeError, "did you mean 'rtol'"),
+    ((Ball(), [[1.0, 2.0]], 1.0), {"rtol": -1}, ValueError, "rtol must"),
+    ((Ball(), [[1.0, 2.0]], 1.0), {"record_steps": True}, TypeError, "record_steps"),
+    ((Ball(), [[1.0, 2.0]], 1.0), {"threads": 0}, ValueError, "threads"),
+    ((Ball(), [[1.0, 2.0]], 1.0), {"executor": 3}, TypeError, "executor"),
+    ((Room(), [[1.0, 2.0]], 1.0), {"mode": "of"}, ValueError, "mode"),
+    ((ricochet.System(), [[1.0, 2.0]], 1.0), {}, TypeError, "no flow"),
+    ((3, [[1.0, 2.0]], 1.0), {}, TypeError, "system: found a int"),
+    ((ricochet.BouncingBall(), {"height": [1.0]}, 1.0), {"parameters": [1.0]}, TypeError, "class"),
+])
+def test_what_no_row_can_be_run_with_is_refused(arguments, options, error, said):
+    with pytest.raises(error, match=said):
+        ricochet.ensemble(*arguments, **options)
+
+
+def test_results_become_frames_of_pandas():
+    starts, parameters = drops(5)
+    balls = ricochet.ensemble(Ball, starts, 3.0, parameters=parameters)
+    try:
+        import pandas  # noqa: F401
+    except ImportError:
+        with pytest.raises(ImportError, match="to_pandas needs pandas"):
+            balls.to_pandas()
+        pytest.skip("pandas was not found")
+    frame = balls.to_pandas()
+    assert list(frame.columns[:5]) == ["restitution", "outcome", "t", "x[0]", "x[1]"]
+    assert np.array_equal(frame["x[1]"], balls.x[:, 1]) and frame.index.name == "row"
+    events = balls.to_pandas(events=True)
+    assert len(events) == len(balls.event_table)
+    assert np.array_equal(events.groupby("row")["t"].count(), balls.events)
+    rooms = ricochet.ensemble(ricochet.Thermostat, {"temperature": [19.0, 20.0]}, 1.0, mode="on")
+    assert rooms.to_pandas()["mode"].tolist() == ["on", "on"]
+    with pytest.raises(ValueError, match="counts them"):
+        rooms.to_pandas(events=True)
+
+
+def test_results_become_datasets_of_xarray():
+    starts, parameters = drops(5)
+    balls = ricochet.ensemble(Ball, starts, 3.0, parameters=parameters, sample_times=[0.0, 1.0])
+    try:
+        import xarray  # noqa: F401
+    except ImportError:
+        with pytest.raises(ImportError, match="to_xarray needs xarray"):
+            balls.to_xarray()
+        pytest.skip("xarray was not found")
+    data = balls.to_xarray()
+    assert data.sizes["row"] == 5 and data.sizes["component"] == 2 and data.sizes["time"] == 2
+    assert np.array_equal(data["states"].sel(time=1.0), balls.states[:, 1])
+    assert np.array_equal(data.coords["restitution"], parameters["restitution"])
+    assert np.array_equal(data["event_t"], balls.event_table["t"])
+    ready = ricochet.ensemble(ricochet.BouncingBall, {"height": [1.0, 2.0]}, 1.0).to_xarray()
+    assert ready["x"].shape == (2, 2) and "event_t" not in ready
