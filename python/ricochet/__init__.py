@@ -7,6 +7,7 @@ state. ``System`` is for modes and many guards, ``integrate`` and ``Simulation``
 floating-point numbers.
 """
 
+from . import _show  # noqa: F401
 from ._compiled import (C_FLOW, C_GUARD, C_RATE, C_RESET, Compiled)
 from ._ensemble import Ensemble, ensemble, row_seed
 from ._inclusion import Inclusion

@@ -213,7 +213,7 @@ def ensemble(system: Union[System, _Ready, Callable[..., Union[System, _Ready]]]
              t_end: float, *, parameters: Any = None,
              columns: Optional[Sequence[str]] = None, x0: Optional[ArrayLike] = None,
              threads: Optional[int] = None, executor: Any = None,
-             progress: Optional[Callable[[int, int], Any]] = None, mode: Any = None,
+             progress: Union[None, bool, Callable[[int, int], Any]] = None, mode: Any = None,
              **options: Any) -> Ensemble: ...
 
 def row_seed(seed: int, index: int) -> int: ...
@@ -226,7 +226,8 @@ def integrate(system: Union[System, _Ready], x0: ArrayLike, t_end: float, *,
               record_events: bool = True, event_states: bool = True, record_steps: bool = False,
               sample_times: Optional[ArrayLike] = None, detector: str = "extremum",
               locator: str = "newton", gate: Union[None, str, PathLike[str], Network] = None,
-              max_steps: int = ..., stall_steps: int = ...) -> Run: ...
+              max_steps: int = ..., stall_steps: int = ...,
+              progress: Union[None, bool, Callable[[float, float], Any]] = None) -> Run: ...
 
 class Simulation:
     def __init__(self, system: Union[System, _Ready], x0: ArrayLike, t_end: float,
@@ -408,6 +409,7 @@ def solve_ivp(fun: Union[Callable[..., Any], Compiled, System, _Ready],
               t_eval: Optional[ArrayLike] = None, dense_output: bool = False,
               events: Any = None, vectorized: bool = False, args: Optional[Sequence] = None, *,
               set_valued: Optional[Inclusion] = None,
+              progress: Union[None, bool, Callable[[float, float], Any]] = None,
               rtol: ArrayLike = 1e-3, atol: ArrayLike = 1e-6, max_step: float = ...,
               first_step: Optional[float] = None, **options: Any) -> OdeResult: ...
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from . import _ricochet
+from . import _progress, _ricochet
 from ._network import set_gate
 from ._ready import Ready
 from ._rows import COUNTS as _COUNTS
@@ -285,9 +285,10 @@ def ensemble(system, table, t_end, *, parameters=None, columns=None, x0=None, th
         `mpi4py.futures`, or a client of `dask.distributed`. The results are the same. To other
         processes a system must be sent, so for a process pool its class or functions stand at the
         top level of an importable module.
-    progress : callable
-        Called regularly with the number of finished rows and the number of rows; if it returns
-        False, the ensemble ends with the results so far.
+    progress : bool or callable
+        True: a bar is shown, by tqdm where that is installed. A function is called regularly with
+        the number of finished rows and the number of rows; if it returns False, the ensemble ends
+        with the results so far.
     mode
         Initial mode of all rows.
     **options
@@ -309,6 +310,14 @@ def ensemble(system, table, t_end, *, parameters=None, columns=None, x0=None, th
         raise TypeError("threads: found together with an executor, which has its own")
     if executor is not None and not callable(getattr(executor, "submit", None)):
         raise TypeError(f"executor: found a {type(executor).__name__}, expected one with submit()")
+    progress = _progress.check(progress)
+    if progress is True:
+        bar = _progress.OfRows(_rows_of(table, parameters))
+        try:
+            return ensemble(system, table, t_end, parameters=parameters, columns=columns, x0=x0,
+                            threads=threads, executor=executor, progress=bar, mode=mode, **options)
+        finally:
+            bar.close()
     if mode is not None:
         options["mode"] = mode
     is_ready = isinstance(system, Ready) or isinstance(system, type) and issubclass(system, Ready)
@@ -321,6 +330,17 @@ def ensemble(system, table, t_end, *, parameters=None, columns=None, x0=None, th
                                    options))
     return _of_ready(system, table, t_end, parameters, columns, x0, threads, executor, progress,
                      options)
+
+
+def _rows_of(table, parameters):
+    """About how many rows there are, for a bar; None where that is not plain to see."""
+    for given in (parameters, table):
+        if given is None:
+            continue
+        try:
+            return len(next(iter(given.values())) if hasattr(given, "items") else given)
+        except (TypeError, StopIteration):
+            return None
 
 
 def _of_ready(system, table, t_end, parameters, columns, x0, threads, executor, progress, options):

@@ -1,17 +1,19 @@
 """Initial value problems with SciPy's arguments and SciPy's result."""
 
+from contextlib import nullcontext
 from difflib import get_close_matches
 from warnings import warn
 
 import numpy as np
 
-from . import _ricochet
+from . import _progress, _ricochet
 from ._compiled import Compiled
 from ._inclusion import specification_of
 from ._network import set_gate
 from ._ready import Ready
 from ._numbers import meant_by
-from ._run import Kind, number_from, numbers_from, set_mode, set_tolerance, source_of, state_from
+from ._run import (Kind, is_called_from_python, number_from, numbers_from, set_mode, set_tolerance,
+                   source_of, state_from)
 from ._system import MOST_EVENTS, Guard, System
 
 _METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78", "Taylor": "taylor"}
@@ -105,7 +107,7 @@ class _Constant:
 
 
 def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, events=None,
-              vectorized=False, args=None, *, set_valued=None, **options):
+              vectorized=False, args=None, *, set_valued=None, progress=None, **options):
     """Solves y' = fun(t, y), y(t0) = y0, with events and resets.
 
     Arguments and result are those of ``scipy.integrate.solve_ivp``, and code that uses these runs
@@ -130,6 +132,7 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
       where they hold something.
     - ``rtol`` is one number; of several numbers the smallest is used. ``atol`` may have one number
       for each component.
+    - ``progress=True`` shows a bar.
     - Further options are those of `integrate`, such as ``event_tolerance`` and ``max_steps``.
 
     Returns
@@ -173,13 +176,14 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     if dense_output:
         given["dense"] = True
 
+    shown = _progress_of(progress, fun, t0, t1)
     if isinstance(fun, (System, Ready)):
         if events is not None:
             raise ValueError("events: found some beside a system, expected them as its guards")
         if set_valued is not None:
             raise ValueError("set_valued: found one beside a system, expected it as a member of the "
                              "system")
-        source, modes = source_of(fun, args)
+        source, modes = source_of(fun, args, shown and shown.watching)
         set_mode(given, fun, modes)
         count = source.guard_count
         watched = True
@@ -193,8 +197,9 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
             def fun(t, y, *further):
                 return np.asarray(pointwise(t, y[:, None], *further)).ravel()
         modes = None
+        flow = fun if shown is None else shown.watching(fun, False)
         source = _ricochet.callback_system(dict(
-            name="solve_ivp", flow=fun, flow_title="fun", args=args, guards=guards,
+            name="solve_ivp", flow=flow, flow_title="fun", args=args, guards=guards,
             set_valued=specification_of(set_valued)))
     if t0 == t1:
         if not np.isfinite(t0):
@@ -204,13 +209,27 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         return _nothing(t0, start, samples, dense_output, count if watched else None)
     events_given = not isinstance(fun, (System, Ready))
     try:
-        run = _ricochet.integrate(source, start, given, modes)
+        with shown or nullcontext():
+            run = _ricochet.integrate(source, start, given, modes)
+            if shown is not None:
+                shown.show(run.t)
     except (ValueError, RuntimeError) as error:
         said = _in_our_words(error, events_given)
         if said is error:
             raise
         raise said from None
     return _result(run, count if watched else None, dense_output, events_given)
+
+
+def _progress_of(progress, fun, t0, t1):
+    """What shows the progress of a run from its flow; None for no progress."""
+    progress = _progress.check(progress)
+    if progress is None or t0 == t1:
+        return None
+    if isinstance(fun, (Ready, Compiled)) or isinstance(fun, System) and not is_called_from_python(fun):
+        raise TypeError("progress: found for a system that is computed without Python, expected it "
+                        "in integrate")
+    return _progress.OfTime(progress, t0, t1)
 
 
 def _refuse_near_names(event, who):

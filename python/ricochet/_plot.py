@@ -46,10 +46,11 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
     -------
     matplotlib.axes.Axes
     """
-    try:
-        from matplotlib import pyplot
-    except ImportError:
-        raise ImportError("ricochet.plot needs matplotlib, which was not found") from None
+    if ax is None:
+        try:
+            from matplotlib import pyplot
+        except ImportError:
+            raise ImportError("ricochet.plot needs matplotlib, which was not found") from None
     run = getattr(run, "run", None) or run
     if getattr(run, "times", None) is None:
         raise ValueError("plot: found a result over no time, expected one over a span of time")

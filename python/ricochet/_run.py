@@ -4,7 +4,8 @@ from enum import IntEnum
 
 import numpy as np
 
-from . import _ricochet
+from . import _progress, _ricochet
+from ._compiled import Compiled
 from ._network import set_gate
 from ._numbers import number_from, numbers_from, state_from
 from ._ready import Ready
@@ -62,21 +63,27 @@ def set_mode(options, system, modes):
         raise ValueError(f"mode: found {given!r}, expected one of {list(names)}")
 
 
-def source_of(system, args=None):
+def source_of(system, args=None, watch=None):
     """The C++ object of a system, and its list of modes."""
     if isinstance(system, Ready):
         if args:
             raise TypeError("args: found some for a ready system, expected none")
         return system._source, None
     if isinstance(system, System):
-        return system._source(args), system._mode_list()
+        return system._source(args, watch), system._mode_list()
     raise TypeError(f"system: found a {type(system).__name__}, expected a ricochet.System or a "
                     "ready system")
 
 
-def prepare(system, x0, t_end, options, args=None):
+def is_called_from_python(system):
+    """Whether the flow of a system is a Python function, called in every step."""
+    return (isinstance(system, System) and system.formula is None
+            and not isinstance(system.flow, Compiled))
+
+
+def prepare(system, x0, t_end, options, args=None, watch=None):
     """The arguments of the C++ functions."""
-    source, modes = source_of(system, args)
+    source, modes = source_of(system, args, watch)
     x0 = state_from(x0, "x0")
     options = dict(options, t_end=number_from(t_end, "t_end"))
     set_mode(options, system, modes)
@@ -97,7 +104,26 @@ def prepare(system, x0, t_end, options, args=None):
     return source, x0, options, modes
 
 
-def integrate(system, x0, t_end, **options):
+def _integrate_with(progress, system, x0, t_end, options):
+    """A run that shows its progress, from the flow or, where that is compiled, between steps."""
+    end = number_from(t_end, "t_end")
+    with _progress.OfTime(progress, number_from(options.get("t_start", 0.0), "t_start"), end) as shown:
+        if is_called_from_python(system):
+            source, x0, options, modes = prepare(system, x0, end, options, watch=shown.watching)
+            run = _ricochet.integrate(source, x0, options, modes)
+        elif options.get("record_steps"):
+            raise TypeError("progress: found beside record_steps for a system that is computed "
+                            "without Python, expected sample_times")
+        else:
+            simulation = Simulation(system, x0, end, **options)
+            while simulation.step():
+                shown.at(simulation.t)
+            run = simulation.finish()
+        shown.show(run.t)
+    return run
+
+
+def integrate(system, x0, t_end, *, progress=None, **options):
     """Integrates a system from ``x0`` at ``t_start`` to ``t_end``.
 
     Parameters
@@ -135,6 +161,9 @@ def integrate(system, x0, t_end, **options):
     gate : Network or path
         The network of a detector that uses one. The ``name`` and the ``parameters`` of the system
         must be those for which it was trained.
+    progress : bool or function (t, t_end)
+        True: a bar is shown, by tqdm where that is installed; a function is called about ten times
+        a second. Its exceptions end the run.
     locator : str
         ``"newton"`` (default), ``"bisection"`` or ``"toms748"``.
     step, h_min, h_max, event_tolerance, event_rtol, event_window, check_inside, stop_at_event,
@@ -148,6 +177,9 @@ def integrate(system, x0, t_end, **options):
     If a function of the system raises an exception, it is passed on unchanged, with the `Run` so
     far as its attribute ``ricochet_run``.
     """
+    progress = _progress.check(progress)
+    if progress is not None:
+        return _integrate_with(progress, system, x0, t_end, options)
     if isinstance(system, Ready):
         run = _ricochet.integrate_plain(system._source, x0, t_end, options)
         if run is not None:

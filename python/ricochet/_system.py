@@ -474,7 +474,8 @@ class System:
             raise TypeError(f"{type(self).__name__}: found flow({found}) in a system {why}, expected "
                             f"flow({mode}t, x{more})")
 
-    def _source(self, args=None):
+    def _source(self, args=None, watch=None):
+        """The C++ object; ``watch(flow, is_moded)`` may put a function around the flow."""
         if not callable(self.flow) and not isinstance(self.flow, Compiled):
             raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
         self._refuse_arguments(args)
@@ -499,6 +500,8 @@ class System:
         if not guards and self.reset_set is not None:
             raise ValueError("reset_set: found it without guards, expected some, or a time_reset")
         flow = self.flow if self.formula is None else self._formulas(args, guards)
+        if watch is not None:
+            flow = watch(flow, self.modes is not None)
         source = _ricochet.callback_system(dict(
             name=self.name or type(self).__name__, flow=flow, args=args,
             modes=self._mode_list(), guards=guards,
