@@ -11,7 +11,7 @@ from . import _show  # noqa: F401
 from ._compiled import (C_FLOW, C_GUARD, C_RATE, C_RESET, Compiled)
 from ._ensemble import Ensemble, ensemble, row_seed
 from ._inclusion import Inclusion
-from ._ivp import OdeResult, solve_ivp
+from ._ivp import solve_ivp
 from ._monitor import Cut, Monitor, Verdict
 from ._network import Network
 from ._plot import plot
@@ -19,6 +19,7 @@ from ._ready import (BouncingBall, CoulombOscillator, ImpactOscillator, Pendulum
                      Thermostat)
 from ._ricochet import Run, Snapshot, Solution, Times, __version__
 from ._run import Kind, Simulation, integrate
+from ._solution import OdeResult
 from ._system import Guard, Stop, System, every, guard
 from ._training import Certified, Trained, certify, train_classifier, train_gate
 

@@ -7,22 +7,21 @@ from warnings import warn
 import numpy as np
 
 from . import _progress, _ricochet
+from ._coded import Empty, coded
 from ._compiled import Compiled
 from ._inclusion import specification_of
 from ._network import set_gate
 from ._ready import Ready
 from ._numbers import meant_by
 from ._run import (Kind, is_called_from_python, number_from, numbers_from, set_mode, set_tolerance,
-                   source_of, state_from)
+                   source_of)
+from ._solution import new_result, new_solution
 from ._system import MOST_EVENTS, Guard, System
 
-_METHODS = {"RK45": "dopri5", "DOP853": "fehlberg78", "Taylor": "taylor"}
-_WITHOUT = {
-    "RK23": "ricochet has no method of order 3; take 'RK45'",
-    "Radau": "the Python package has no implicit method",
-    "BDF": "the Python package has no implicit method",
-    "LSODA": "the Python package has no implicit method",
-}
+_METHODS = {"RK45": "dopri5", "RK23": "dopri5", "DOP853": "fehlberg78", "Taylor": "taylor"}
+#: Said at the end of a message, of methods that another one stands in for.
+_NOTES = {"RK23": " There is no method of order 3: 'RK23' was run as 'RK45'."}
+_IMPLICIT = ("Radau", "BDF", "LSODA")
 _IMPLICIT_OPTIONS = ("jac", "jac_sparsity", "lband", "uband", "min_step")
 _KINDS = {kind.value: kind.name.lower() for kind in Kind}
 _EPS = np.finfo(float).eps
@@ -71,26 +70,6 @@ def _in_our_words(error, events):
     return type(error)(text)
 
 
-class OdeResult(dict):
-    """A dictionary whose values are also attributes."""
-
-    def __getattr__(self, name):
-        try:
-            return self[name]
-        except KeyError:
-            raise AttributeError(name) from None
-
-    __setattr__ = dict.__setitem__
-    __delattr__ = dict.__delitem__
-
-    def __dir__(self):
-        return list(self)
-
-    def __repr__(self):
-        width = max(map(len, self), default=0)
-        return "\n".join(f"{name:>{width}}: {value!r}" for name, value in self.items())
-
-
 class _Constant:
     """The solution over an interval of length zero."""
 
@@ -114,8 +93,10 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     unchanged. Differences:
 
     - ``method``: ``'RK45'`` (Dormand and Prince, as in SciPy) or ``'DOP853'``, which is replaced
-      by Fehlberg's method of order 8; for ready systems and formulas also ``'Taylor'``. No other
-      methods are available.
+      by Fehlberg's method of order 8; for ready systems and formulas also ``'Taylor'``. ``'RK23'``
+      is run as ``'RK45'``, which the message says; there are no implicit methods.
+    - ``y0`` may be complex or empty, as in SciPy; `result.run` has complex components as pairs, and
+      real and imaginary parts meet the tolerance by themselves.
     - ``fun`` may also be a `System`, whose guards then are the events.
     - An event may have, besides ``terminal`` (also a number of events) and ``direction``:
 
@@ -150,22 +131,29 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     """
     if isinstance(method, type):
         method = method.__name__
-    if method in _WITHOUT:
-        raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853': "
-                         f"{_WITHOUT[method]}")
+    if method in _IMPLICIT:
+        raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853': the Python package "
+                         "has no implicit method yet; for a stiff system let a ricochet.Monitor find "
+                         f"the events in the steps of scipy.integrate.{method}, or take 'RK45' where "
+                         "small steps are affordable")
     if method not in _METHODS:
         raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853'")
     try:
         t0, t1 = (number_from(t, "t_span") for t in t_span)
     except (TypeError, ValueError):
         raise ValueError(f"t_span: found {t_span!r}, expected two numbers") from None
-    start = state_from(y0, "y0")
+    start, code = coded(y0)
     if args is not None:
         try:
             args = tuple(args)
         except TypeError:
             raise TypeError(f"Supplied 'args' cannot be unpacked. Found {args!r}, expected a "
                             f"tuple; of one argument: args=({args!r},)") from None
+    if code is not None:
+        if isinstance(fun, (System, Ready)) or set_valued is not None:
+            raise ValueError(f"y0: found {code.what} beside a system or set_valued, expected "
+                             "real components")
+        options["atol"] = code.tolerances(options.get("atol", 1e-6))
     given = _options(options, t0, t1, len(start))
     given["method"] = _METHODS[method]
     samples = _sample_times(t_eval, t0, t1)
@@ -188,7 +176,7 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         count = source.guard_count
         watched = True
     else:
-        guards, is_list = _guards(events, t0, start, args or ())
+        guards, is_list = _guards(events, t0, start, args or (), code)
         count = len(guards)
         watched = is_list
         if vectorized and not isinstance(fun, Compiled):
@@ -197,6 +185,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
             def fun(t, y, *further):
                 return np.asarray(pointwise(t, y[:, None], *further)).ravel()
         modes = None
+        if code is not None:
+            fun = code.flow(fun)
         flow = fun if shown is None else shown.watching(fun, False)
         source = _ricochet.callback_system(dict(
             name="solve_ivp", flow=flow, flow_title="fun", args=args, guards=guards,
@@ -206,7 +196,10 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
             raise ValueError(f"t_span: found {t_span!r}, expected finite times")
         if not np.all(np.isfinite(start)):
             raise ValueError(f"y0: found {y0!r}, expected finite numbers")
-        return _nothing(t0, start, samples, dense_output, count if watched else None)
+        return _nothing(t0, start, samples, dense_output, count if watched else None, code)
+    if isinstance(code, Empty) and not count:
+        fun(t0, np.zeros(1), *(args or ()))
+        return _of_empty(t0, t1, samples, dense_output, count if watched else None, code)
     events_given = not isinstance(fun, (System, Ready))
     try:
         with shown or nullcontext():
@@ -218,7 +211,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         if said is error:
             raise
         raise said from None
-    return _result(run, count if watched else None, dense_output, events_given)
+    return _result(run, count if watched else None, dense_output, events_given, code,
+                   _NOTES.get(method, ""))
 
 
 def _progress_of(progress, fun, t0, t1):
@@ -258,7 +252,7 @@ def _options(options, t0, t1, components):
     options = dict(options)
     for name in _IMPLICIT_OPTIONS:
         if name in options:
-            warn(f"{name} has no effect for an explicit method", stacklevel=3)
+            warn(f"The following arguments have no effect for a chosen solver: `{name}`", stacklevel=3)
             del options[name]
     rtol = float(numbers_from(options.pop("rtol", 1e-3), "rtol").min())
     if rtol < 100 * _EPS:
@@ -271,11 +265,12 @@ def _options(options, t0, t1, components):
         raise ValueError(f"atol: found {atol}, expected numbers that are not negative")
     set_tolerance(given, atol, components)
     max_step = options.pop("max_step", None)
+    max_step, first_step = (step.item() if isinstance(step, np.ndarray) and step.ndim == 0 else step
+                            for step in (max_step, options.pop("first_step", None)))
     if max_step is not None:
         if not _is_number(max_step) or not max_step > 0:
             raise ValueError(f"max_step: found {max_step!r}, expected a positive number")
         given["h_max"] = float(max_step)
-    first_step = options.pop("first_step", None)
     if first_step is not None:
         if not _is_number(first_step) or not 0 < first_step <= abs(t1 - t0):
             raise ValueError(f"first_step: found {first_step!r}, expected a number in "
@@ -313,18 +308,19 @@ def _sample_times(t_eval, t0, t1):
     return times
 
 
-def _guards(events, t0, start, args):
+def _guards(events, t0, start, args, code):
     """A list of dictionaries of guards, and whether there are events."""
     if events is None:
         return [], False
     if callable(events) or isinstance(events, (Guard, Compiled)):
         events = (events,)
-    y = np.array(start)
+    y = np.array(start) if code is None else code.shown(np.array(start))
     out = []
     for index, event in enumerate(events):
         who = f"events[{index}]"
         if isinstance(event, Guard):
-            out.append(dict(event._specification(index), title=who))
+            specification = dict(event._specification(index), title=who)
+            out.append(specification if code is None else code.guard(specification))
             continue
         if not callable(event) and not isinstance(event, Compiled):
             raise TypeError(f"{who}: found a {type(event).__name__}, expected a function (t, y)")
@@ -357,13 +353,18 @@ def _guards(events, t0, start, args):
                 first = None
             specification["boolean"] = isinstance(first, (bool, np.bool_)) or (
                 isinstance(first, np.ndarray) and first.dtype == bool)
-        out.append(specification)
+        out.append(specification if code is None else code.guard(specification))
     return out, True
 
 
-def _result(run, count, dense_output, events_given):
-    result = OdeResult(t=run.times, y=run.states.T, sol=run.solution if dense_output else None,
-                       t_events=None, y_events=None)
+def _result(run, count, dense_output, events_given, code, note):
+    def shown(states):
+        return states if code is None else code.shown(states)
+
+    result = new_result(dict(
+        t=run.times, y=shown(run.states).T,
+        sol=new_solution(run.solution, code) if dense_output else None, t_events=None,
+        y_events=None))
     statistics = run.statistics
     message = run.message if run.reason else _MESSAGES.get(run.outcome, run.message)
     if events_given:
@@ -374,7 +375,7 @@ def _result(run, count, dense_output, events_given):
             message += f": {names[run.guard]}, {names[run.other_guard]}"
     result.update(nfev=statistics.flow_calls, njev=0, nlu=0,
                   status={"reached_end": 0, "stopped_by_event": 1}.get(run.outcome, -1),
-                  message=message, success=run.success)
+                  message=message + note, success=run.success)
     result.update(y_events_after=None, kinds=None, modes=None)
     if count is not None:
         events = run.events
@@ -382,7 +383,7 @@ def _result(run, count, dense_output, events_given):
         chosen = [np.flatnonzero(guards == index) for index in range(count)]
         result.t_events = [events["t"][which] for which in chosen]
         for name, field in (("y_events", "before"), ("y_events_after", "after")):
-            states = events[field]
+            states = shown(events[field])
             result[name] = [states[which] if which.size else np.empty(0) for which in chosen]
         kinds = events["kind"]
         result.kinds = [[_KINDS[kind] for kind in kinds[which].tolist()] for which in chosen]
@@ -395,14 +396,28 @@ def _result(run, count, dense_output, events_given):
     return result
 
 
-def _nothing(t, y, samples, dense_output, count):
+def _of_empty(t0, t1, samples, dense_output, count, code):
+    """The result for a state without components: nothing moves."""
+    result = _nothing(t0, [0.0], samples, dense_output, count, code)
+    if samples is None:
+        result.update(t=np.array([t0, t1]), y=np.empty((0, 2)))
+    if dense_output:
+        result.sol.t_min, result.sol.t_max = min(t0, t1), max(t0, t1)
+        result.sol.ts = np.array([t0, t1])
+    result.nfev = 1
+    return result
+
+
+def _nothing(t, y, samples, dense_output, count, code):
     """The result of an integration over an interval of length zero."""
     t_out = np.array([t]) if samples is None else samples
+    y = np.array(y) if code is None else code.shown(np.array(y))
     no_events = None if count is None else [np.empty(0) for _ in range(count)]
-    return OdeResult(t=t_out, y=np.tile(np.array(y)[:, None], (1, t_out.size)),
+    return new_result(dict(
+                     t=t_out, y=np.tile(y[:, None], (1, t_out.size)),
                      sol=_Constant(t, y) if dense_output else None, t_events=no_events,
                      y_events=no_events, nfev=0, njev=0, nlu=0, status=0,
                      message=_MESSAGES["reached_end"], success=True, y_events_after=no_events,
                      kinds=None if count is None else [[] for _ in range(count)],
                      modes=no_events, outcome="reached_end", statistics=None, guard=None, phases=[],
-                     reactions=np.empty((0, t_out.size)), run=None)
+                     reactions=np.empty((0, t_out.size)), run=None))

@@ -26,4 +26,4 @@ cd "$source/tests/python"
 PYTHONPATH=$room/build/python RICOCHET_SOURCE=$source MPLBACKEND=Agg PYTHONDONTWRITEBYTECODE=1 \
     "$venv" run.py ensemble_test.py own_ensemble_test.py event_systems_test.py formula_test.py held_test.py \
     hybrid_test.py instants_test.py meaning_test.py monitor_test.py network_test.py refusals_test.py \
-    rest_test.py scipy_test.py show_test.py set_valued_test.py times_test.py veto_test.py docs_test.py
+    rest_test.py scipy_test.py scipy_own_test.py show_test.py set_valued_test.py times_test.py veto_test.py docs_test.py

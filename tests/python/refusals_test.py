@@ -99,7 +99,7 @@ def test_a_solution_at_no_time():
 
 
 @pytest.mark.parametrize("y0, error", [
-    ([], ValueError), ([[1.0, 2.0]], ValueError), (1.0, ValueError), ([1j], ValueError),
+    ([[1.0, 2.0]], ValueError), (1.0, ValueError), ([[1j]], ValueError),
     (["a"], (TypeError, ValueError)), ([None], (TypeError, ValueError)), ([math.nan], ValueError),
     ([math.inf], ValueError), ({"a": 1}, (TypeError, ValueError))])
 def test_starts_that_are_none(y0, error):
@@ -110,7 +110,6 @@ def test_starts_that_are_none(y0, error):
 
 
 @pytest.mark.parametrize("options, error, words", [
-    ({"method": "RK23"}, ValueError, "RK45"),
     ({"method": "Radau"}, ValueError, "the Python package has no implicit method"),
     ({"method": "BDF"}, ValueError, "implicit"), ({"method": "LSODA"}, ValueError, "implicit"),
     ({"method": "rk"}, ValueError, "'rk'"), ({"method": 3}, ValueError, "3"),

@@ -1,51 +1,13 @@
 """Code written for SciPy, run with our solve_ivp."""
 
-import inspect
+import pickle
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 import ricochet
-
-
-@pytest.fixture
-def theirs(monkeypatch):
-    """SciPy's own tests, with solve_ivp replaced.
-
-    Their loops over methods include some that ricochet does not have: for these DOP853 stands
-    in, at a tenth of the tolerances. (test_args asks of Radau at 1e-10 for what neither of
-    SciPy's explicit methods reaches there.)
-    """
-    tests = pytest.importorskip("scipy.integrate._ivp.tests.test_ivp")
-
-    def solve(fun, t_span, y0, method="RK45", **options):
-        options.pop("jac", None)
-        if method not in ("RK45", "DOP853"):
-            method = "DOP853"
-            for name in ("rtol", "atol"):
-                if np.ndim(options.get(name, [0])) == 0:
-                    options[name] /= 10
-        result = ricochet.solve_ivp(fun, t_span, y0, method, **options)
-        if result.t.size == 0:
-            # SciPy has lists there, and asks whether they are true; an empty array is refused that.
-            result.t, result.y = [], []
-        return result
-
-    monkeypatch.setattr(tests, "solve_ivp", solve)
-    return tests
-
-
-@pytest.mark.parametrize("name", [
-    "test_events", "test_t_eval_early_event", "test_args", "test_args_single_value",
-    "test_t_eval", "test_t_eval_dense_output", "test_no_integration", "test_max_step",
-    "test_first_step", "test_array_rtol"])
-def test_scipys_own_tests_pass(theirs, name):
-    if not hasattr(theirs, name):
-        pytest.skip("this SciPy has no such test")
-    test = getattr(theirs, name)
-    # a fixture of SciPy's own for the threads of a run of its tests
-    has_threads = "num_parallel_threads" in inspect.signature(test).parameters
-    test(*[1] * has_threads)
 
 
 def test_times_that_an_event_cuts_off_leave_empty_arrays():
@@ -187,3 +149,109 @@ def test_samples_beside_a_dense_output_cost_no_further_calls(method, count):
     assert both.nfev <= 1.2 * dense.nfev
     # Both follow the motion to the error of an accepted step, at most 1e-10 + 1e-12.
     np.testing.assert_allclose(both.y, dense.sol(t_eval), rtol=0, atol=2.02e-10)
+
+
+def spiral(t, z, rate=1.0):
+    return (-0.3 + 2j * rate) * z
+
+
+@pytest.mark.parametrize("method", ["RK45", "DOP853"])
+def test_complex_states_are_scipys(method):
+    solve = pytest.importorskip("scipy.integrate").solve_ivp
+
+    def imaginary(t, z, rate):
+        return z[0].imag
+
+    given = dict(t_span=(0, 6), y0=[1 + 0j, 2j], args=(1.5,), events=imaginary, method=method,
+                 rtol=1e-9, atol=[1e-9, 1e-10], dense_output=True, t_eval=np.linspace(0, 6, 9))
+    ours, scipys = ricochet.solve_ivp(spiral, **given), solve(spiral, **given)
+    assert ours.y.dtype == complex and ours.y.shape == (2, 9)
+    np.testing.assert_allclose(ours.y, scipys.y, atol=1e-7)
+    np.testing.assert_allclose(ours.sol([0.5, 1.0]), scipys.sol([0.5, 1.0]), atol=1e-7)
+    assert ours.sol(1.0).shape == (2,) and ours.sol(1.0).dtype == complex
+    after = scipys.t_events[0][scipys.t_events[0] > 0]
+    np.testing.assert_allclose(ours.t_events[0], after, atol=1e-7)
+    assert ours.y_events[0].shape == (after.size, 2) and ours.y_events[0].dtype == complex
+    assert ours.run.x.shape == (4,)  # pairs
+
+
+def test_resets_of_complex_states():
+    def turned(t, z):
+        return z[0].imag
+
+    turned.direction = -1
+    turned.reset = lambda t, z: [1 + 1j]
+    result = ricochet.solve_ivp(lambda t, z: 1j * z, (0, 8), [1 + 1j], events=turned, rtol=1e-10,
+                                atol=1e-10, dense_output=True)
+    # From pi/4 to pi, again and again.
+    np.testing.assert_allclose(result.t_events[0], 0.75 * np.pi * np.arange(1, 4), atol=1e-8)
+    np.testing.assert_allclose(result.y_events[0], -np.sqrt(2), atol=1e-8)
+    assert np.array_equal(result.y_events_after[0], np.full((3, 1), 1 + 1j))
+    at = result.t_events[0][0]
+    np.testing.assert_allclose(result.sol.before(at), -np.sqrt(2), atol=1e-8)
+    assert result.sol(at) == [1 + 1j]
+
+    turned.reset = lambda t, z: ricochet.Stop("turned", [3j])
+    result = ricochet.solve_ivp(lambda t, z: 1j * z, (0, 8), [1 + 1j], events=turned)
+    assert result.run.reason == "turned" and result.y[0, -1] == 3j
+
+
+def test_complex_states_of_another_size_are_refused():
+    with pytest.raises(ValueError, match="fun returned 2 numbers for a state of 1"):
+        ricochet.solve_ivp(lambda t, z: [1j, 1j], (0, 1), [1j])
+    with pytest.raises(ValueError, match="y0: found a complex y0 beside a system"):
+        ricochet.solve_ivp(ricochet.BouncingBall(), (0, 1), [1j, 0])
+    with pytest.raises(TypeError, match="fun: found a compiled function beside a complex y0"):
+        ricochet.solve_ivp(ricochet.Compiled(4096), (0, 1), [1j])
+    with pytest.raises(ValueError, match="found complex numbers"):
+        ricochet.integrate(ricochet.System(lambda t, x: x), [1j], 1.0)
+
+
+def test_a_state_without_components():
+    def half(t, y):
+        assert y.shape == (0,)
+        return t - 0.5
+
+    def fun(t, y):
+        assert y.shape == (0,)
+        return []
+
+    for options in ({}, {"events": half}):
+        result = ricochet.solve_ivp(fun, (0, 2), [], dense_output=True, **options)
+        assert result.success and result.y.shape == (0, result.t.size)
+        assert result.t[0] == 0 and result.t[-1] == 2
+        assert result.sol(1.0).shape == (0,) and result.sol([0.5, 1.0]).shape == (0, 2)
+    assert result.t_events[0] == [0.5] and result.y_events[0].shape == (1, 0)
+    sampled = ricochet.solve_ivp(fun, (0, 2), [], t_eval=[0.5, 1.5])
+    assert sampled.t.tolist() == [0.5, 1.5] and sampled.y.shape == (0, 2)
+
+
+def test_a_method_of_another_order_says_so():
+    result = ricochet.solve_ivp(swing, (0, 1), [1.0, 0.0], method="RK23")
+    same = ricochet.solve_ivp(swing, (0, 1), [1.0, 0.0])
+    assert result.success and np.array_equal(result.y, same.y)
+    assert result.message.startswith(same.message) and "'RK23' was run as 'RK45'" in result.message
+
+
+def test_implicit_methods_say_what_to_do():
+    for method in ("Radau", "BDF", "LSODA"):
+        with pytest.raises(ValueError, match=rf"Monitor .* steps of scipy.integrate.{method}"):
+            ricochet.solve_ivp(swing, (0, 1), [1.0, 0.0], method=method)
+
+
+def test_results_have_scipys_types_where_scipy_is_loaded():
+    integrate = pytest.importorskip("scipy.integrate")
+    from scipy.optimize import OptimizeResult
+
+    result = ricochet.solve_ivp(swing, (0, 1), [1.0, 0.0], dense_output=True)
+    assert isinstance(result, OptimizeResult) and isinstance(result, ricochet.OdeResult)
+    assert isinstance(result.sol, integrate.OdeSolution)
+    assert np.array_equal(result.sol.ts, result.t)
+    last = result.sol.interpolants[-1]
+    assert np.array_equal(last(result.t[-1]), result.y[:, -1])
+    assert last(result.t[-2:]).shape == (2, 2)
+    again = pickle.loads(pickle.dumps(result))
+    assert isinstance(again, OptimizeResult) and np.array_equal(again.sol(0.3), result.sol(0.3))
+    code = ("import sys, ricochet; r = ricochet.solve_ivp(lambda t, y: -y, (0, 1), [1.0]); "
+            "assert type(r) is ricochet.OdeResult; assert 'scipy' not in sys.modules")
+    subprocess.run([sys.executable, "-c", code], check=True)
