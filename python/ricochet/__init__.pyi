@@ -2,7 +2,7 @@ from enum import IntEnum
 from os import PathLike
 from types import SimpleNamespace
 from typing import (Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Sequence,
-                    Tuple, Union)
+                    Tuple, Union, overload)
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +14,8 @@ C_GUARD: str
 C_RATE: str
 C_RESET: str
 
-Floats = NDArray[np.float64]
+_Floats = NDArray[np.float64]
+_Function = Union[Callable[..., Any], Compiled]
 
 class Compiled:
     def __init__(self, function: Any, user: Any = None) -> None: ...
@@ -30,11 +31,11 @@ class Kind(IntEnum):
     JUMP = 7
 
 class Solution:
-    def __call__(self, t: ArrayLike) -> Floats: ...
-    def before(self, t: ArrayLike) -> Floats: ...
+    def __call__(self, t: ArrayLike) -> _Floats: ...
+    def before(self, t: ArrayLike) -> _Floats: ...
     def mode(self, t: float) -> Any: ...
     @property
-    def ts(self) -> Floats: ...
+    def ts(self) -> _Floats: ...
     @property
     def t_min(self) -> float: ...
     @property
@@ -52,7 +53,7 @@ class Run:
     @property
     def t(self) -> float: ...
     @property
-    def x(self) -> Floats: ...
+    def x(self) -> _Floats: ...
     @property
     def mode(self) -> Any: ...
     @property
@@ -60,7 +61,7 @@ class Run:
     @property
     def other_guard(self) -> Optional[int]: ...
     @property
-    def modes(self) -> Optional[list]: ...
+    def modes(self) -> Optional[list[Any]]: ...
     @property
     def guard_names(self) -> list[str]: ...
     @property
@@ -70,17 +71,17 @@ class Run:
     @property
     def event_modes(self) -> list[Tuple[Any, Any]]: ...
     @property
-    def times(self) -> Floats: ...
+    def times(self) -> _Floats: ...
     @property
-    def states(self) -> Floats: ...
+    def states(self) -> _Floats: ...
     @property
     def solution(self) -> Optional[Solution]: ...
     @property
     def phases(self) -> list[Tuple[float, bool, str]]: ...
     @property
-    def reaction(self) -> Floats: ...
+    def reaction(self) -> _Floats: ...
     @property
-    def reactions(self) -> Floats: ...
+    def reactions(self) -> _Floats: ...
 
 class Snapshot:
     @property
@@ -91,18 +92,18 @@ class Snapshot:
 class Guard:
     name: Optional[str]
     def __init__(
-        self, value: Optional[Union[Callable[..., Any], Compiled]] = None, *,
+        self, value: Optional[_Function] = None, *,
         name: Optional[str] = None, direction: float = -1,
-        reset: Optional[Union[Callable[..., Any], Compiled]] = None,
-        rest: Optional[Union[Callable[..., Any], Compiled]] = None,
-        rate: Optional[Union[Callable[..., Any], Compiled]] = None,
-        enabled: Optional[Callable[..., Any]] = None, in_modes: Optional[Sequence] = None,
+        reset: Optional[_Function] = None,
+        rest: Optional[_Function] = None,
+        rate: Optional[_Function] = None,
+        enabled: Optional[Callable[..., Any]] = None, in_modes: Optional[Sequence[Any]] = None,
         unilateral: bool = False, boolean: bool = False, degree: int = 0, touch: float = 0.0,
         stop_after: int = 0, at_start: bool = False, at_entry: bool = False,
-        speed_bound: Optional[Union[Callable[..., Any], Compiled]] = None,
-        acceleration_bound: Optional[Union[Callable[..., Any], Compiled]] = None,
-        lower_bound: Optional[Union[Callable[..., Any], Compiled]] = None,
-        upper_bound: Optional[Union[Callable[..., Any], Compiled]] = None,
+        speed_bound: Optional[_Function] = None,
+        acceleration_bound: Optional[_Function] = None,
+        lower_bound: Optional[_Function] = None,
+        upper_bound: Optional[_Function] = None,
         lipschitz: float = 1.0, resets: bool = True, directed: bool = False) -> None: ...
     def rate(self, function: Callable[..., Any]) -> Guard: ...
     def reset(self, function: Callable[..., Any]) -> Guard: ...
@@ -113,7 +114,10 @@ class Guard:
     def lower_bound(self, function: Callable[..., Any]) -> Guard: ...
     def upper_bound(self, function: Callable[..., Any]) -> Guard: ...
 
-def guard(value: Optional[Callable[..., Any]] = None, **options: Any) -> Any: ...
+@overload
+def guard(value: Callable[..., Any], **options: Any) -> Guard: ...
+@overload
+def guard(value: None = None, **options: Any) -> Callable[[Callable[..., Any]], Guard]: ...
 
 class Inclusion:
     def __init__(
@@ -121,7 +125,7 @@ class Inclusion:
         observe: Optional[ArrayLike] = None, act: Optional[ArrayLike] = None,
         mass: Optional[ArrayLike] = None, offset: Optional[Callable[..., Any]] = None,
         offset_rate: Optional[Callable[..., Any]] = None, reactions: Optional[int] = None,
-        stands_for: Optional[Sequence[Optional[int]]] = None, in_modes: Optional[Sequence] = None,
+        stands_for: Optional[Sequence[Optional[int]]] = None, in_modes: Optional[Sequence[Any]] = None,
         change: Optional[Callable[..., Any]] = None,
         start_mode: Optional[Callable[..., Any]] = None) -> None: ...
 
@@ -148,8 +152,9 @@ class System:
     changes_dimension: bool
     parameters: Optional[Mapping[str, float]]
     formula: Optional[int]
-    def __init__(self, flow: Optional[Union[Callable[..., Any], Compiled]] = None,
+    def __init__(self, flow: Optional[_Function] = None,
                  guards: Optional[Sequence[Any]] = None, **members: Any) -> None: ...
+    def __init_subclass__(cls, unchecked_names: bool = False, **options: Any) -> None: ...
 
 class _Ready:
     modes: Optional[Tuple[str, ...]]
@@ -201,9 +206,14 @@ class Ensemble:
     inputs: dict[str, NDArray[Any]]
     event_table: Optional[NDArray[np.void]]
     guard_names: list[str]
-    modes: Optional[list]
-    times: Optional[Floats]
-    states: Optional[Floats]
+    modes: Optional[list[Any]]
+    times: Optional[_Floats]
+    states: Optional[_Floats]
+    def __init__(self, rows: NDArray[Any], failures: dict[int, str], complete: bool, *,
+                 inputs: Optional[dict[str, NDArray[Any]]] = None,
+                 event_table: Optional[NDArray[np.void]] = None, guard_names: Sequence[str] = (),
+                 modes: Optional[list[Any]] = None, times: Optional[_Floats] = None,
+                 states: Optional[_Floats] = None) -> None: ...
     def to_pandas(self, events: bool = False) -> Any: ...
     def to_xarray(self) -> Any: ...
     def __len__(self) -> int: ...
@@ -232,7 +242,7 @@ def integrate(system: Union[System, _Ready], x0: ArrayLike, t_end: float, *,
 class Simulation:
     def __init__(self, system: Union[System, _Ready], x0: ArrayLike, t_end: float,
                  **options: Any) -> None: ...
-    def __iter__(self) -> Iterator[Tuple[float, Floats]]: ...
+    def __iter__(self) -> Iterator[Tuple[float, _Floats]]: ...
     def step(self) -> bool: ...
     def advance(self) -> bool: ...
     def run_to_end(self) -> Run: ...
@@ -242,11 +252,11 @@ class Simulation:
     def restart(self, t: float, x: ArrayLike, mode: int | str | None = None) -> None: ...
     def extend(self, t_end: float) -> None: ...
     @property
-    def reaction(self) -> Floats: ...
+    def reaction(self) -> _Floats: ...
     @property
     def t(self) -> float: ...
     @property
-    def x(self) -> Floats: ...
+    def x(self) -> _Floats: ...
     @property
     def mode(self) -> Any: ...
     @property
@@ -260,7 +270,7 @@ class Network:
     def from_bytes(cls, content: bytes, name: str = "bytes") -> Network: ...
     def to_bytes(self) -> bytes: ...
     def save(self, path: Union[str, PathLike[str]]) -> None: ...
-    def __call__(self, features: ArrayLike) -> Floats: ...
+    def __call__(self, features: ArrayLike) -> _Floats: ...
     def alarm(self, features: ArrayLike) -> Any: ...
     def in_domain(self, features: ArrayLike) -> Any: ...
     def cleared(self, features: ArrayLike) -> Any: ...
@@ -283,17 +293,17 @@ class Network:
     @property
     def step_range(self) -> Tuple[float, float]: ...
     @property
-    def domain(self) -> Floats: ...
+    def domain(self) -> _Floats: ...
     @property
     def inputs(self) -> int: ...
     @property
     def outputs(self) -> int: ...
     @property
-    def layers(self) -> list[Tuple[Floats, Floats]]: ...
+    def layers(self) -> list[Tuple[_Floats, _Floats]]: ...
     @property
-    def offset(self) -> Floats: ...
+    def offset(self) -> _Floats: ...
     @property
-    def scale(self) -> Floats: ...
+    def scale(self) -> _Floats: ...
     @property
     def levels(self) -> list[Tuple[float, float]]: ...
     @property
@@ -309,6 +319,9 @@ class Trained:
     trial: SimpleNamespace
     verdict: str
     report: Optional[dict[str, Any]]
+    def __init__(self, network: Optional[Network], outcome: str, message: str, misses_none: bool,
+                 trial: SimpleNamespace, verdict: str,
+                 report: Optional[dict[str, Any]]) -> None: ...
 
 class Certified:
     network: Network
@@ -317,8 +330,11 @@ class Certified:
     message: str
     levels: list[SimpleNamespace]
     estimates: list[SimpleNamespace]
-    counterexample: Optional[Floats]
+    counterexample: Optional[_Floats]
     seconds: float
+    def __init__(self, network: Network, proved: bool, outcome: str, message: str,
+                 levels: list[SimpleNamespace], estimates: list[SimpleNamespace],
+                 counterexample: Optional[_Floats], seconds: float) -> None: ...
 
 def train_classifier(
     system: Union[System, _Ready], starts: Any, *, step: float, mode: Any = None,
@@ -338,8 +354,8 @@ def train_gate(
 
 def certify(
     network: Union[str, PathLike[str], Network], system: Union[System, _Ready],
-    slack: Union[Sequence[float], Callable[[Floats], float]], *,
-    least: Optional[Callable[[Floats, Floats], float]] = None,
+    slack: Union[Sequence[float], Callable[[_Floats], float]], *,
+    least: Optional[Callable[[_Floats, _Floats], float]] = None,
     progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None, margin: float = 0.0,
     levels: int = 1, ratio: float = 2.0, seed: int = 1, threads: int = 2, limit: float = 300.0,
     **options: Any) -> Certified: ...
@@ -353,8 +369,8 @@ class Verdict(IntEnum):
 class Cut(NamedTuple):
     t: float
     s: float
-    before: Floats
-    after: Floats
+    before: _Floats
+    after: _Floats
     mode_before: Any
     mode_after: Any
     fired: list[int]
@@ -384,7 +400,7 @@ class Monitor:
     @property
     def t(self) -> float: ...
     @property
-    def x(self) -> Floats: ...
+    def x(self) -> _Floats: ...
     @property
     def mode(self) -> Any: ...
     @property
@@ -402,12 +418,32 @@ class Monitor:
     def restore(self, snapshot: Snapshot) -> None: ...
 
 class OdeResult(dict[str, Any]):
+    t: _Floats
+    y: NDArray[Any]
+    sol: Any
+    t_events: Optional[list[_Floats]]
+    y_events: Optional[list[NDArray[Any]]]
+    y_events_after: Optional[list[NDArray[Any]]]
+    kinds: Optional[list[list[str]]]
+    modes: Optional[list[NDArray[Any]]]
+    nfev: int
+    njev: int
+    nlu: int
+    status: int
+    message: str
+    success: bool
+    outcome: str
+    statistics: Optional[SimpleNamespace]
+    guard: Optional[int]
+    phases: list[Tuple[float, bool, str]]
+    reactions: _Floats
+    run: Optional[Run]
     def __getattr__(self, name: str) -> Any: ...
 
 def solve_ivp(fun: Union[Callable[..., Any], Compiled, System, _Ready],
               t_span: Tuple[float, float], y0: ArrayLike, method: Any = "RK45",
               t_eval: Optional[ArrayLike] = None, dense_output: bool = False,
-              events: Any = None, vectorized: bool = False, args: Optional[Sequence] = None, *,
+              events: Any = None, vectorized: bool = False, args: Optional[Sequence[Any]] = None, *,
               set_valued: Optional[Inclusion] = None,
               progress: Union[None, bool, Callable[[float, float], Any]] = None,
               rtol: ArrayLike = 1e-3, atol: ArrayLike = 1e-6, max_step: float = ...,

@@ -7,7 +7,26 @@ import numpy as np
 
 
 class OdeResult(dict):
-    """A dictionary whose values are also attributes.
+    """A result of `solve_ivp`: a dictionary whose values are also attributes.
+
+    t, y : ndarray, shapes (times,) and (n, times)
+        The times, in the unit of ``t_span``, and the states there; complex for a complex ``y0``.
+    sol : OdeSolution or Solution
+        ``sol(t)``, shape (n,) or (n, times), with ``dense_output``; else None.
+    t_events, y_events, y_events_after : list of ndarray, shapes (events,), (events, n)
+        For each event function the times, and the states before and after resets. None without
+        events.
+    kinds, modes : list
+        For each event function what its events were, and the modes before and after, shape
+        (events, 2).
+    nfev, njev, nlu : int
+        Calls of ``fun``; the others are zero.
+    status, message, success : int, str, bool
+        0: the end was reached, 1: an event ended the run, -1: it failed.
+    outcome, guard, statistics, run : str, int, namespace, Run
+        How the run ended, the event that ended it, counts of calls and steps, and the run itself.
+    phases, reactions : list, and ndarray of shape (m, times)
+        With ``set_valued``: the changes of phase, and the reactions.
 
     Where a program has loaded ``scipy.integrate``, results are instances of SciPy's class, too.
     """

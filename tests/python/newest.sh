@@ -11,7 +11,7 @@ if ! [ -x "$venv" ]; then
     "$python" -m venv "$room/venv" || { echo "skipped: $python makes no virtual environment"; exit 77; }
 fi
 "$venv" -m pip install --quiet --disable-pip-version-check --retries 1 --timeout 20 --upgrade \
-    numpy scipy pybind11 pytest cffi ||
+    numpy scipy pybind11 pytest cffi mypy pandas xarray tqdm distributed ||
     { echo "skipped: pip could not fetch NumPy, SciPy, pybind11 and pytest"; exit 77; }
 "$venv" -m pip list --disable-pip-version-check
 
@@ -26,4 +26,4 @@ cd "$source/tests/python"
 PYTHONPATH=$room/build/python RICOCHET_SOURCE=$source MPLBACKEND=Agg PYTHONDONTWRITEBYTECODE=1 \
     "$venv" run.py ensemble_test.py own_ensemble_test.py event_systems_test.py formula_test.py held_test.py \
     hybrid_test.py instants_test.py meaning_test.py monitor_test.py network_test.py refusals_test.py \
-    rest_test.py scipy_test.py scipy_own_test.py show_test.py set_valued_test.py times_test.py veto_test.py docs_test.py
+    rest_test.py scipy_test.py scipy_own_test.py show_test.py set_valued_test.py times_test.py types_test.py veto_test.py docs_test.py
