@@ -75,10 +75,15 @@ def run_block(system, first, starts, parameters, t_end, options):
     """Runs rows; executors call it, so all its arguments must be picklable."""
     done, failures, events, states = [], {}, [], []
     names = modes = None
+    is_made = isinstance(system, System)
+    if is_made:  # formulas are recorded once for all rows
+        source, _, common, mode_list = prepare(system, starts[0], t_end, options)
     for row, (x0, (given, named)) in enumerate(zip(starts, parameters), first):
         try:
-            own = system if isinstance(system, System) else system(*given, **named)
-            run = integrate(own, x0, t_end, **options)
+            if is_made:
+                run = _ricochet.integrate(source, x0.tolist(), common, mode_list)
+            else:
+                run = integrate(system(*given, **named), x0, t_end, **options)
         except Exception as error:
             failures[row] = _said(row, error)
             done.append(("failed", np.nan, np.empty(0), 0, (0,) * len(COUNTS)))
@@ -135,11 +140,15 @@ def _event_table(arrays, kind, width):
     """The events of rows in one table, whose states have a common width."""
     fields = [(name, kind[name]) if name not in ("before", "after") or kind[name].shape == (0,)
               else (name, float, (width,)) for name in kind.names]
+    arrays = [(row, array) for row, array in arrays if len(array)]
     out = np.zeros(sum(len(array) for _, array in arrays), [("row", np.int64), *fields])
+    out["row"] = np.repeat([row for row, _ in arrays], [len(array) for _, array in arrays])
+    parts = [array for _, array in arrays]
+    if len({array.dtype for array in parts}) == 1:  # mostly: all fields at once
+        parts = [np.concatenate(parts)]
     begin = 0
-    for row, array in arrays:
+    for array in parts:
         part = out[begin:begin + len(array)]
-        part["row"] = row
         for name in kind.names:
             if array.dtype[name].shape == part.dtype[name].shape:
                 part[name] = array[name]
@@ -214,11 +223,13 @@ def _joined(found, complete, kind, starts, samples, columns):
     out = np.zeros(count, [("outcome", "U24"), ("t", float), ("x", float, (width,)),
                            ("mode", np.uint32), *((name, np.uint64) for name in COUNTS)])
     out["t"] = out["x"] = np.nan
-    for i, (outcome, t, x, mode, counts) in enumerate(done):
-        out["outcome"][i], out["t"][i], out["mode"][i] = outcome, t, mode
-        out["x"][i, :len(x)] = x
-        for name, number in zip(COUNTS, counts):
-            out[name][i] = number
+    ran = out[:len(done)]
+    for i, (_, _, x, _, _) in enumerate(done):
+        ran["x"][i, :len(x)] = x
+    for name, index in (("outcome", 0), ("t", 1), ("mode", 3)):
+        ran[name] = [row[index] for row in done]
+    for i, name in enumerate(COUNTS):
+        ran[name] = [row[4][i] for row in done]
     states = None
     if samples is not None:
         states = np.full((count, samples.size, width), np.nan)

@@ -121,6 +121,19 @@ def test_the_bits_depend_neither_on_executors_nor_on_workers():
         assert content(found) == expected
 
 
+@pytest.mark.parametrize("formula", [None, 2])
+def test_a_system_that_is_made_serves_all_rows_and_threads(formula):
+    swing = ricochet.System(
+        lambda t, x: [x[1], -np.sin(x[0])],
+        [ricochet.Guard(lambda t, x: x[0], unilateral=True, reset=lambda t, x: [0.0, -0.8 * x[1]])],
+        formula=formula)
+    starts = np.column_stack([np.linspace(0.1, 2.0, 40), np.zeros(40)])
+    one = ricochet.ensemble(swing, starts, 8.0)
+    assert content(ricochet.ensemble(swing, starts, 8.0, threads=3)) == content(one)
+    for i in (0, 17, 39):
+        assert one.x[i].tobytes() == ricochet.integrate(swing, starts[i], 8.0).x.tobytes()
+
+
 def test_a_cluster_of_dask_gives_the_same_bits():
     distributed = pytest.importorskip("distributed")
     starts, parameters = drops()
