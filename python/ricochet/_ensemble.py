@@ -375,5 +375,8 @@ def _of_ready(system, table, t_end, parameters, columns, x0, threads, executor, 
 
 
 def row_seed(seed, index):
-    """Seed of the random numbers of row ``index``, as `ensemble` in C++ has it."""
+    """Seed of the random numbers of row ``index``, an integer below 2**64, as `ensemble` in C++ has it.
+
+    ``seed`` and ``index`` are integers that are not negative, below 2**64.
+    """
     return _ricochet.row_seed(seed, index)

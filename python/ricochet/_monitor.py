@@ -9,31 +9,53 @@ from ._run import Named, set_mode, source_of, state_from
 
 
 class Verdict(Named):
-    """The next action of a host."""
+    """The next action of a host.
 
-    STANDS = 0  #: the step stands: continue from its end
-    CUT = 1     #: the step ends at a set of events: continue from ``cut.after``, and ``resume``
-    RESTS = 2   #: the motion has come to rest: keep the state until ``must_stop_at``, then ``hold``
-    ENDED = 3   #: the run is over; ``run.outcome`` says why
+    STANDS : the step stands: continue from its end
+    CUT : the step ends at a set of events: continue from ``cut.after``, and ``resume``
+    RESTS : the motion has come to rest: keep the state until ``must_stop_at``, then ``hold``
+    ENDED : the run is over; ``run.outcome`` says why
+    """
+
+    STANDS = 0
+    CUT = 1
+    RESTS = 2
+    ENDED = 3
 
 
 _VERDICTS = tuple(Verdict)
 
 
 class Cut(NamedTuple):
-    """A set of events, all at the same time, that ends a step."""
+    """A set of events, all at the same time, that ends a step.
 
-    t: float             #: its time
-    s: float             #: offset from the start of the last step
-    before: object       #: the state before the resets
-    after: object        #: the state after them
+    t, s : float
+        Its time, and the offset of this from the start of the last step.
+    before, after : ndarray, shape (n,)
+        The states before and after the resets.
+    mode_before, mode_after
+        The modes, by name where the system names them.
+    fired, fired_names : list
+        Numbers of the guards that fired, ascending, and their names.
+    on_time : bool
+        Whether a time event is among them.
+    accumulation : bool
+        Whether ``after`` is the state of ``rest`` after infinitely many events.
+    state_changed : bool
+        If False, the host need not restart.
+    """
+
+    t: float
+    s: float
+    before: object
+    after: object
     mode_before: object
     mode_after: object
-    fired: list          #: numbers of the guards that fired, ascending
+    fired: list
     fired_names: list
-    on_time: bool        #: whether a time event is among them
-    accumulation: bool   #: whether ``after`` is the state of ``rest`` after infinitely many events
-    state_changed: bool  #: if False, the host need not restart
+    on_time: bool
+    accumulation: bool
+    state_changed: bool
 
 
 _OPTIONS = ("event_tolerance", "event_rtol", "event_window", "check_inside", "record_events",

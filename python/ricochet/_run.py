@@ -23,16 +23,26 @@ class Named(IntEnum):
 
 
 class Kind(Named):
-    """Kind of an event: the field ``kind`` of ``run.events``."""
+    """Kind of an event: the field ``kind`` of ``run.events``.
 
-    CROSSING = 0      #: the guard changed sign
-    TOUCH = 1         #: the guard reached its surface and turned back
-    TIME = 2          #: a time event
-    ACCUMULATION = 3  #: the limit of infinitely many events
-    MODE = 4          #: the flow lifts what the rest of the guard held
+    CROSSING : the guard changed sign
+    TOUCH : the guard reached its surface and turned back
+    TIME : a time event
+    ACCUMULATION : the limit of infinitely many events
+    MODE : the flow lifts what the rest of the guard held; a reaction goes to its other bound
+    STICK : a reaction begins to hold something, with ``set_valued``
+    SLIP : it no longer does
+    JUMP : the guard changed sign without a zero
+    """
+
+    CROSSING = 0
+    TOUCH = 1
+    TIME = 2
+    ACCUMULATION = 3
+    MODE = 4
     STICK = 5
     SLIP = 6
-    JUMP = 7          #: the guard changed sign without a zero
+    JUMP = 7
 
 
 def set_tolerance(options, atol, components):

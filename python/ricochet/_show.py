@@ -89,5 +89,32 @@ def _page(run):
     return "".join(parts)
 
 
+_ricochet.Run.__doc__ = """What a run has computed; its arrays are read-only views of it.
+
+outcome, message, success, reason : str, str, bool, str
+    How the run ended, a sentence about it, whether that is an end as wanted, and the text of a
+    `Stop` or which function was not finite.
+t, x, mode : float, ndarray of shape (n,), and a mode
+    Where it ended.
+guard, other_guard : int or None
+    The guard that ended it, and the second of two whose resets contradict each other.
+events : ndarray, shape (events,)
+    A structured array with the fields ``t``, ``guard`` (an index into `guard_names`, -1 for a time
+    event), ``kind`` (a `Kind`), ``mode_before``, ``mode_after``, ``before`` and ``after`` (states,
+    shape (n,)), ``bracket`` (times on both sides, shape (2,)), ``slope`` (of the guard along the
+    motion), ``error`` (of the time), ``late`` and ``reaction``.
+event_modes : list of tuples
+    The modes before and after each event, by name where the system names them.
+times, states : ndarray, shapes (times,) and (times, n)
+    At ``sample_times``, or with ``record_steps`` at the ends of steps. Shorter states end in NaN.
+solution : Solution or None
+    With ``record_steps``: ``solution(t)``, shape (n,) or for times (n, times).
+phases, reaction, reactions : list, and ndarrays of shapes (m,) and (times, m)
+    With ``set_valued``: the changes of phase, and the reactions at the end and at `times`.
+statistics : namespace
+    Counts of steps, calls and events.
+
+Times have the unit of the caller's flow.
+"""
 _ricochet.Run.__repr__ = _line
 _ricochet.Run._repr_html_ = _page
