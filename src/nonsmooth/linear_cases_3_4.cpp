@@ -1,0 +1,8 @@
+#include "ricochet/nonsmooth/detail/linear_cases.hpp"
+
+namespace ricochet {
+
+template struct LinearInequality<3>;
+template struct LinearInequality<4>;
+
+}  // namespace ricochet
