@@ -28,8 +28,8 @@
 #include "problems/least_eigenvalue.hpp"
 #include "problems/planar_arm.hpp"
 #include "ricochet/base/random.hpp"
+#include "ricochet/learn/adam.hpp"
 #include "ricochet/learn/certify.hpp"
-#include "ricochet/learn/detail/adam.hpp"
 #include "ricochet/nn/model.hpp"
 
 namespace ricochet::bench {

@@ -85,8 +85,8 @@ template <class Detector>
 {
     std::uint64_t calls = 0;
     const HostSystem system{crossing};
-    const GuardView<HostSystem, HostState> guard(system, calls, {.backward = step.backward()},
-                                                 crossing);
+    const detail::GuardView<HostSystem, HostState> guard(system, calls,
+                                                         {.backward = step.backward()}, crossing);
     watch.start = {.s = 0, .value = step.x0()[1], .rate = step.rate0()[1]};
     const Finding finding = examine_step(detector, guard, step, watch);
     if (guard_calls) *guard_calls = calls;

@@ -20,7 +20,7 @@ template <class Locator>
 {
     std::uint64_t calls = 0;
     const HostSystem system;
-    const GuardView<HostSystem, HostState> guard(system, calls);
+    const detail::GuardView<HostSystem, HostState> guard(system, calls);
     ProbeSpace<HostState> space(step.x0());
     StepProbe probe(guard, step, space);
     probe.watch(side);

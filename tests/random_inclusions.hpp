@@ -13,8 +13,8 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/nonsmooth/detail/linear_cases.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
 
 namespace ricochet::test {
 

@@ -216,8 +216,9 @@ struct RandomRollingBall {
             }
         }
         // While it rolls by events y drifts by the tolerance of events, for any other steps.
-        const double broken = law_violation(InclusionMatrices<RollingBall>(system), run.state.t,
-                                            run.state.w, run.state.reaction, ball.t_end / 200);
+        const double broken =
+            law_violation(detail::InclusionMatrices<RollingBall>(system), run.state.t, run.state.w,
+                          run.state.reaction, ball.t_end / 200);
         if (!(broken <= 1e-6)) {
             return fmt::format("breaks the law by {:.3e}, T/{}, seed {}", broken, divisions, seed);
         }

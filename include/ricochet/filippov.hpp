@@ -545,7 +545,7 @@ private:
     [[nodiscard]] double own_value(std::size_t which, double t, const X& x) const
     {
         std::uint64_t calls = 0;  // the loop counts them
-        return GuardView<Own, X>(own(), calls, {which - surface_guards, 0}).value(t, x);
+        return detail::GuardView<Own, X>(own(), calls, {which - surface_guards, 0}).value(t, x);
     }
     template <class X>
     [[nodiscard]] double own_rate(std::size_t which, double t, const X& x, const X& dxdt) const
@@ -555,7 +555,8 @@ private:
         const double speed = detail::largest_component(dxdt);
         const double scale =
             0.6 * (speed > 0 ? size / speed : detail::greatest_of(1.0, std::fabs(t)));
-        return GuardView<Own, X>(own(), calls, {which - surface_guards, 0}).rate(t, x, dxdt, scale);
+        return detail::GuardView<Own, X>(own(), calls, {which - surface_guards, 0})
+            .rate(t, x, dxdt, scale);
     }
     template <class X>
     void own_rates(double t, const X& x, const X& dxdt, std::span<double> rates) const

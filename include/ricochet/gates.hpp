@@ -13,9 +13,9 @@
 #include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/around.hpp"
 #include "ricochet/detail/features.hpp"
-#include "ricochet/detail/gate.hpp"
 #include "ricochet/detail/meter.hpp"
 #include "ricochet/extremum.hpp"
+#include "ricochet/gate.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/planned.hpp"
 

@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -193,5 +194,12 @@ struct Event {
 /// Type of the components of X.
 template <class X>
 using ScalarOf = std::remove_cvref_t<decltype(std::declval<const X&>()[0])>;
+
+/// The guard at one time inside a step. The rate is NaN where it was not computed.
+struct GuardSample {
+    double s = 0;      ///< [s] offset from the start of the step
+    double value = 0;  ///< g
+    double rate = std::numeric_limits<double>::quiet_NaN();  ///< dg/ds along the flow
+};
 
 }  // namespace ricochet

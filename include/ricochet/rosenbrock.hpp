@@ -639,7 +639,7 @@ class KernelOf<System, X, Rosenbrock4> {
         });
     }
 
-    static SeriesTerms series(void* door, const State& state)
+    static detail::SeriesTerms series(void* door, const State& state)
     {
         return {at(door).room.series.data(), 3, static_cast<std::size_t>(state.x0.size())};
     }

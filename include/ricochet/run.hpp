@@ -189,13 +189,13 @@ public:
             visit(nodes);
             visit(piece.departures);
             visit(piece.slopes);
-            piece.nodes = static_cast<DenseNodes>(nodes);
+            piece.nodes = static_cast<detail::DenseNodes>(nodes);
             piece.departures = detail::least_of<std::size_t>(piece.departures, 3);
             piece.slopes = detail::least_of(piece.slopes, piece.departures);
             for (State* x : {&piece.x0, &piece.remainder, &piece.rate0}) visit.state(*x);
             for (std::size_t k = 0; k < piece.departures; ++k) visit.state(piece.w[k]);
             for (std::size_t k = 0; k < piece.slopes; ++k) visit.state(piece.slope[k]);
-            if (piece.nodes == DenseNodes::series) {
+            if (piece.nodes == detail::DenseNodes::series) {
                 std::size_t numbers = piece.series.size();
                 visit(numbers);
                 piece.series.resize(numbers);
@@ -207,7 +207,8 @@ public:
     }
 
     /// Adds a step, of which only the first `length` [s] were used.
-    void add(double t0, bool backward, Mode mode, const DenseParts<State>& parts, double length)
+    void add(double t0, bool backward, Mode mode, const detail::DenseParts<State>& parts,
+             double length)
     {
         Piece piece{.t = t0,
                     .length = length,
@@ -222,7 +223,7 @@ public:
             if (parts.w[k]) piece.w[piece.departures++] = *parts.w[k];
             if (parts.w[k] && parts.slope[k]) piece.slope[piece.slopes++] = *parts.slope[k];
         }
-        if (parts.nodes == DenseNodes::series) {
+        if (parts.nodes == detail::DenseNodes::series) {
             const double* const first = parts.series.coefficients;
             const auto orders = static_cast<std::size_t>(parts.series.order) + 1;
             piece.series.assign(first, first + orders * parts.series.stride);
@@ -292,7 +293,7 @@ private:
         double t, length, h;
         bool backward;
         Mode mode;
-        DenseNodes nodes;
+        detail::DenseNodes nodes;
         State x0, remainder, rate0;
         std::size_t departures = 0, slopes = 0;  ///< numbers of `w` and `slope`
         std::array<State, 3> w{}, slope{};
@@ -321,11 +322,11 @@ private:
     [[nodiscard]] static State evaluate(const Piece& piece, double t)
     {
         if (offset(piece, t) >= offset(piece, piece.end_time)) return piece.end;
-        DenseParts<State> parts{.nodes = piece.nodes,
-                                .h = piece.h,
-                                .x0 = &piece.x0,
-                                .remainder = &piece.remainder,
-                                .rate0 = &piece.rate0};
+        detail::DenseParts<State> parts{.nodes = piece.nodes,
+                                        .h = piece.h,
+                                        .x0 = &piece.x0,
+                                        .remainder = &piece.remainder,
+                                        .rate0 = &piece.rate0};
         const std::size_t without_slope = piece.departures - piece.slopes;
         for (std::size_t k = 0; k < piece.departures; ++k) {
             parts.w[k] = &piece.w[k];
@@ -337,7 +338,7 @@ private:
         }
         const double s = detail::least_of(detail::greatest_of(offset(piece, t), 0.0), piece.length);
         if (s > 0) {
-            const DenseView<State, false> view(parts, s);
+            const detail::DenseView<State, false> view(parts, s);
             detail::for_each_component(x, [&](auto i) { x[i] = view[i]; });
         }
         return x;

@@ -65,7 +65,7 @@ concept DenseStep = MethodStep<S, X> && requires(const S& step)
 {
     {
         step.dense()
-        } -> std::convertible_to<DenseParts<X>>;
+        } -> std::convertible_to<detail::DenseParts<X>>;
 };
 
 namespace detail {
@@ -378,7 +378,7 @@ private:
         if constexpr (requires { step_->rate_of_polynomial(s, space_->dxdt); }) {
             step_->rate_of_polynomial(s, space_->dxdt);
         } else if constexpr (DenseStep<Step, State>) {
-            const DenseView<State, true> rate(step_->dense(), s);
+            const detail::DenseView<State, true> rate(step_->dense(), s);
             detail::for_each_component(space_->x, [&](auto i) { space_->dxdt[i] = rate[i]; });
         } else {
             step_->flow(s, space_->x, space_->dxdt);
@@ -435,9 +435,9 @@ private:
         if constexpr (requires { step.template component_view<derivative>(s); }) {
             return step.template component_view<derivative>(s);
         } else if constexpr (DenseStep<Step, State>) {
-            return DenseView<State, derivative>(step.dense(), s);
+            return detail::DenseView<State, derivative>(step.dense(), s);
         } else {
-            return DenseView<State, derivative>({}, s);  // never evaluated
+            return detail::DenseView<State, derivative>({}, s);  // never evaluated
         }
     }
     using View = decltype(component_view<false>(std::declval<const Step&>(), 0.0));

@@ -21,7 +21,7 @@
 #include "policy_advice.hpp"
 #include "registry.hpp"
 #include "report.hpp"
-#include "ricochet/detail/gate_features.hpp"
+#include "ricochet/gate_features.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"

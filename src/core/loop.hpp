@@ -30,7 +30,7 @@
 #include "core/tolerances.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/lending_loop.hpp"
-#include "ricochet/detail/step_control.hpp"
+#include "ricochet/step_control.hpp"
 
 namespace ricochet::detail {
 

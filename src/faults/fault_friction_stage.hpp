@@ -23,7 +23,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ricochet/faults/detail/friction_stage.hpp"
+#include "ricochet/faults/friction_stage.hpp"
 #include "ricochet/faults/strike_slip_fault.hpp"
 #include "stiffness_series.hpp"
 

@@ -1,4 +1,4 @@
-#include "ricochet/faults/detail/fault_stiffness.hpp"
+#include "ricochet/faults/fault_stiffness.hpp"
 
 #include <fmt/format.h>
 

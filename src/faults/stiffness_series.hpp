@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "ricochet/faults/detail/fault_stiffness.hpp"
+#include "ricochet/faults/fault_stiffness.hpp"
 
 namespace ricochet {
 

@@ -1,4 +1,4 @@
-#include "ricochet/learn/detail/adam.hpp"
+#include "ricochet/learn/adam.hpp"
 
 #include <cmath>
 #include <stdexcept>

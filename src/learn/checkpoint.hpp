@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "ricochet/base/random.hpp"
-#include "ricochet/learn/detail/adam.hpp"
+#include "ricochet/learn/adam.hpp"
 
 namespace ricochet::learn {
 

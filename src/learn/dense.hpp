@@ -49,7 +49,7 @@ struct OuterProduct {
     T* sums = nullptr;    ///< null: none
 };
 
-/// One step of Adam (learn/detail/adam.hpp) for n parameters, n whole cache lines. The gradient is
+/// One step of Adam (learn/adam.hpp) for n parameters, n whole cache lines. The gradient is
 /// the sum of `parts`, one after the other `part_stride` apart. Then, if there is a target,
 /// target += polyak (parameter - target).
 template <class T>

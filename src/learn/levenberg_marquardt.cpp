@@ -1,4 +1,4 @@
-#include "ricochet/learn/detail/levenberg_marquardt.hpp"
+#include "ricochet/learn/levenberg_marquardt.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

@@ -12,7 +12,7 @@
 #include "base/require.hpp"
 #include "friction_models.hpp"
 #include "ricochet/faults/variational_step.hpp"
-#include "ricochet/learn/detail/adam.hpp"
+#include "ricochet/learn/adam.hpp"
 
 namespace ricochet::learn {
 

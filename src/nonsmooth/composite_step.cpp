@@ -1,4 +1,4 @@
-#include "ricochet/nonsmooth/detail/composite_step.hpp"
+#include "ricochet/nonsmooth/composite_step.hpp"
 
 #include "base/require.hpp"
 

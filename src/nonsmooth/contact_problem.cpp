@@ -1,4 +1,4 @@
-#include "ricochet/nonsmooth/detail/contact_problem.hpp"
+#include "ricochet/nonsmooth/contact_problem.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/nonsmooth/detail/linear_cases.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
 
 namespace ricochet {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <utility>
 
-#include "ricochet/nonsmooth/detail/contact_problem.hpp"
+#include "ricochet/nonsmooth/contact_problem.hpp"
 
 namespace ricochet::detail {
 

@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "ricochet/detail/runge_kutta.hpp"
-#include "ricochet/detail/step_control.hpp"
+#include "ricochet/step_control.hpp"
 
 namespace ricochet::detail {
 

@@ -1,4 +1,4 @@
-#include "ricochet/sensitivity/detail/differences.hpp"
+#include "ricochet/sensitivity/differences.hpp"
 
 #include <fmt/format.h>
 

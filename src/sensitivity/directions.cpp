@@ -1,4 +1,4 @@
-#include "ricochet/sensitivity/detail/directions.hpp"
+#include "ricochet/sensitivity/directions.hpp"
 
 #include <fmt/format.h>
 

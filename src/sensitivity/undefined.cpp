@@ -1,4 +1,4 @@
-#include "ricochet/sensitivity/detail/undefined.hpp"
+#include "ricochet/sensitivity/undefined.hpp"
 
 namespace ricochet {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "ricochet/learn/detail/levenberg_marquardt.hpp"
+#include "ricochet/learn/levenberg_marquardt.hpp"
 
 namespace ricochet::learn {
 

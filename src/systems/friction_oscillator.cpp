@@ -1,4 +1,4 @@
-#include "ricochet/systems/detail/friction_oscillator.hpp"
+#include "ricochet/systems/friction_oscillator.hpp"
 
 #include <cmath>
 

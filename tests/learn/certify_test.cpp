@@ -17,7 +17,7 @@
 
 #include "learn/bounds.hpp"
 #include "ricochet/base/random.hpp"
-#include "ricochet/detail/gate.hpp"
+#include "ricochet/gate.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 

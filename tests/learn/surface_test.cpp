@@ -1,4 +1,4 @@
-#include "ricochet/learn/detail/surface.hpp"
+#include "ricochet/learn/surface.hpp"
 
 #include <array>
 #include <cmath>

@@ -5,7 +5,7 @@
 //
 // and two such blocks, of which one rubs on the other.
 
-#include "ricochet/nonsmooth/detail/branch_modes.hpp"
+#include "ricochet/nonsmooth/branch_modes.hpp"
 
 #include <gtest/gtest.h>
 

@@ -226,7 +226,7 @@ TEST(ContactMotion, ElasticImpactsKeepTheEnergyToRounding)
         const Eigen::Vector2d v(x[2], x[3]);
         return v.dot(m * v) / 2;
     };
-    const double start = energy(FreeFlight<Shuttle>::state({0, 0.5}, {0.3, 1}));
+    const double start = energy(detail::FreeFlight<Shuttle>::state({0, 0.5}, {0.3, 1}));
     // Some ten operations per impact are rounded, each by at most 1.1e-16.
     for (const auto& impact : run.events) {
         EXPECT_NEAR(energy(impact.after), energy(impact.before), 2e-15 * start) << impact.t;

@@ -264,7 +264,7 @@ TEST(ContactPhases, RandomBarsStayOverTheFloorAndBetweenTheWallsAndGoOnFromSnaps
         ASSERT_TRUE(run.outcome == Outcome::reached_end || at_wall) << seed;
         ended += run.outcome == Outcome::reached_end;
         V2 gaps;
-        bar.gaps(run.t, FreeFlight<Bar>::position(run.x), gaps);
+        bar.gaps(run.t, detail::FreeFlight<Bar>::position(run.x), gaps);
         // Corners fall at 8 m/s at most: 2 h after which a contact is closed.
         EXPECT_GT(gaps.minCoeff(), -16e-3) << seed;
         EXPECT_LT(std::fabs(run.x[0]), bar.wall + 1e-9) << seed;

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "random_contacts.hpp"
-#include "ricochet/nonsmooth/detail/contact_problem.hpp"
+#include "ricochet/nonsmooth/contact_problem.hpp"
 
 namespace ricochet::contacts_full_test {
 namespace {

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "random_contacts.hpp"
-#include "ricochet/nonsmooth/detail/contact_problem.hpp"
-#include "ricochet/nonsmooth/detail/linear_cases.hpp"
+#include "ricochet/nonsmooth/contact_problem.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
 
 namespace ricochet::contacts_test {
 namespace {

@@ -50,7 +50,7 @@ TEST(InclineBlockMotion, ComesToRestWhereFrictionHoldsIt)
 TEST(InclineBlockMotion, StartsWithTheFrictionOfItsDirection)
 {
     const InclineBlock block;
-    const InclusionMatrices<InclineBlock> m(block);
+    const detail::InclusionMatrices<InclineBlock> m(block);
     const double bound = 0.5 * 9.81 * std::cos(0.3);
     const auto sliding = minimal_selection(m, 0, {3, -4, 0, 0});
     EXPECT_NEAR(sliding[0], -0.6 * bound, 1e-7);

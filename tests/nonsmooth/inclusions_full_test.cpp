@@ -44,7 +44,7 @@ protected:
                 EXPECT_LE(reference.error(i, run.trajectory.x[i]),
                           reference.allowed(options.set_valued.step));
             }
-            const InclusionMatrices<RandomInclusion<M>> matrices(system);
+            const detail::InclusionMatrices<RandomInclusion<M>> matrices(system);
             EXPECT_LE(law_violation(matrices, run.state.t, run.state.w, run.state.reaction,
                                     options.set_valued.step),
                       1e-6);

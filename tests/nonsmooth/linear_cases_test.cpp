@@ -1,6 +1,6 @@
 // Linear variational inequalities of a few unknowns.
 
-#include "ricochet/nonsmooth/detail/linear_cases.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
 
 #include <gtest/gtest.h>
 

@@ -576,7 +576,7 @@ TEST(Locate, FindsTheReleaseOfTheStuckDiodeFromTheReaction)
 
 TEST(MinimalSelection, OpposesMotionBalancesRestAndYieldsAtTheBound)
 {
-    const InclusionMatrices<FrictionInclusion> m(FrictionInclusion{});
+    const detail::InclusionMatrices<FrictionInclusion> m(FrictionInclusion{});
     EXPECT_EQ(minimal_selection(m, 0, {1, 0.5})[0], -0.3);
     EXPECT_EQ(minimal_selection(m, 0, {1, -0.5})[0], 0.3);
     EXPECT_DOUBLE_EQ(minimal_selection(m, 0, {0.2, 0})[0], 0.2);
@@ -601,7 +601,7 @@ struct FastBelt {
 TEST(MinimalSelection, FollowsTheDeclaredRateOfAFastSurface)
 {
     for (const double frequency : {1.0, 1e3, 1e6}) {
-        const InclusionMatrices<FastBelt> m(FastBelt{frequency});
+        const detail::InclusionMatrices<FastBelt> m(FastBelt{frequency});
         EXPECT_DOUBLE_EQ(minimal_selection(m, 0, {0, 0})[0], 1) << frequency;
     }
 }

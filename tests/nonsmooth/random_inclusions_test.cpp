@@ -34,7 +34,7 @@ void follow(InclusionFamily family, std::uint64_t seed, int reference_steps)
     const RandomInclusion<M> system = random_inclusion<M>(family, seed);
     const ReferenceMotion reference(system, reference_steps, samples);
     ASSERT_TRUE(reference.solved);
-    const InclusionMatrices<RandomInclusion<M>> matrices(system);
+    const detail::InclusionMatrices<RandomInclusion<M>> matrices(system);
     for (const double divisions : {200, 1000, 5000}) {
         const auto run = run_of<M>(system, divisions);
         ASSERT_EQ(run.outcome, Outcome::reached_end) << name(run.outcome);

@@ -1,6 +1,6 @@
 // Newton's method for equations that are piecewise smooth.
 
-#include "ricochet/nonsmooth/detail/semismooth_newton.hpp"
+#include "ricochet/nonsmooth/semismooth_newton.hpp"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,7 @@
 #include <cmath>
 #include <random>
 
-#include "ricochet/nonsmooth/detail/contact_problem.hpp"
+#include "ricochet/nonsmooth/contact_problem.hpp"
 
 namespace ricochet::detail::contact_law_test {
 namespace {

@@ -20,7 +20,7 @@
 
 #include "ricochet/detail/small_state.hpp"
 
-namespace ricochet {
+namespace ricochet::detail {
 
 /// Nodes of a step's polynomial besides its start.
 enum class DenseNodes {
@@ -42,8 +42,6 @@ enum class DenseNodes {
     }
     return 0;
 }
-
-namespace detail {
 
 /// Weights of up to three departures and three slopes, for the value at u or its
 /// derivative with respect to u. Slopes are per unit of u.
@@ -112,8 +110,6 @@ template <std::size_t n>
     return {};
 }
 
-}  // namespace detail
-
 /// Coefficients of power series in the offset s from the start of a step: the coefficient of s^k in
 /// component i is `coefficients[k stride + i]`.
 struct SeriesTerms {
@@ -157,9 +153,7 @@ template <class X, bool derivative>
 class DenseView {
 public:
     DenseView(const DenseParts<X>& parts, double s) noexcept
-        : parts_(parts),
-          s_(s),
-          weights_(detail::dense_weights(parts.nodes, s / parts.h, derivative))
+        : parts_(parts), s_(s), weights_(dense_weights(parts.nodes, s / parts.h, derivative))
     {
         const double unit = derivative ? 1 / parts.h : 1;
         for (std::size_t k = 0; k < 3; ++k) {
@@ -193,13 +187,13 @@ private:
     /// Series have terms of the components alone, not of the zeros behind them.
     [[nodiscard]] bool has_terms([[maybe_unused]] std::size_t i) const noexcept
     {
-        if constexpr (std::is_same_v<X, detail::SmallState>) return i < parts_.series.stride;
+        if constexpr (std::is_same_v<X, SmallState>) return i < parts_.series.stride;
         return true;
     }
 
     DenseParts<X> parts_;
     double s_;
-    detail::DenseWeights weights_;
+    DenseWeights weights_;
 };
 
-}  // namespace ricochet
+}  // namespace ricochet::detail

@@ -17,17 +17,7 @@
 #include "ricochet/detail/scratch.hpp"
 #include "ricochet/guard.hpp"
 
-namespace ricochet {
-
-/// Options of `Filippov`.
-struct FilippovOptions {
-    /// [1/s] Sliding follows h' = -restoring_rate h, which corrects the drift that the errors of
-    /// the steps cause on a curved surface; a plane has no such drift. The rate must be slow
-    /// compared with the motion, or it makes the motion stiff.
-    double restoring_rate = 0;
-};
-
-namespace detail {
+namespace ricochet::detail {
 
 /// The fields give the rates of their surfaces.
 template <class Fields, class X>
@@ -506,6 +496,4 @@ private:
     FilippovOptions options_;
 };
 
-}  // namespace detail
-
-}  // namespace ricochet
+}  // namespace ricochet::detail

@@ -12,24 +12,9 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace ricochet {
+#include "ricochet/sliding.hpp"
 
-/// Place of a motion with respect to a switching surface h = 0.
-enum class Place : std::uint8_t {
-    below,    ///< h < 0
-    above,    ///< h > 0
-    sliding,  ///< held on h = 0 by the fields of both sides
-};
-
-/// Type of the meeting of two fields at a switching surface.
-enum class Meeting : std::uint8_t {
-    crossing_up,    ///< both fields lead up
-    crossing_down,  ///< both fields lead down
-    attractive,     ///< neither field leads away: the motion slides
-    repulsive,      ///< both fields lead away: the motion is not unique
-};
-
-namespace detail {
+namespace ricochet::detail {
 
 /// A place for each surface.
 using Places = std::array<Place, 2>;
@@ -157,6 +142,4 @@ private:
 /// @throws std::invalid_argument: the rate is negative or not finite.
 void check_restoring_rate(double rate);
 
-}  // namespace detail
-
-}  // namespace ricochet
+}  // namespace ricochet::detail

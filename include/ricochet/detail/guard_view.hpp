@@ -16,16 +16,7 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/system.hpp"
 
-namespace ricochet {
-
-/// The guard at one time inside a step. The rate is NaN where it was not computed.
-struct GuardSample {
-    double s = 0;      ///< [s] offset from the start of the step
-    double value = 0;  ///< g
-    double rate = std::numeric_limits<double>::quiet_NaN();  ///< dg/ds along the flow
-};
-
-namespace detail {
+namespace ricochet::detail {
 
 /// The index in the type that x uses for its indices.
 template <class Index, class X>
@@ -91,8 +82,6 @@ template <class X>
     return x;
 }
 
-}  // namespace detail
-
 /// One guard in one mode. Rates are with respect to the offset inside a step, so in
 /// a run backward in time they are the negative of dg/dt.
 template <class System, class X>
@@ -115,12 +104,12 @@ public:
 
     /// Whether the guard can be evaluated on a view of the state.
     template <class V>
-    static constexpr bool sees = detail::GuardAlone<System, V>;
+    static constexpr bool sees = GuardAlone<System, V>;
 
     /// Whether its rate can be evaluated on views of the state and of its rate.
     template <class V, class D>
     static constexpr bool sees_rate =
-        detail::RateAlone<System, V, D>&& detail::RateAlone<System, V, detail::NegatedView<D>>;
+        RateAlone<System, V, D>&& RateAlone<System, V, NegatedView<D>>;
 
     /// Whether the system gives its rate; else it is a difference quotient.
     static constexpr bool is_rated = RatedGuard<System, X>;
@@ -142,7 +131,7 @@ public:
     {
         count();
         if constexpr (sees<V>) {
-            return detail::call_guard(*system_, at_.which, at_.mode, t, x);
+            return call_guard(*system_, at_.which, at_.mode, t, x);
         } else {
             return one_of_all(t, x);
         }
@@ -155,7 +144,7 @@ public:
     [[nodiscard]] double rate(double t, const V& x, const D& dxdt, double scale) const
     {
         const double rate = raw_rate(t, x, dxdt, scale);
-        if constexpr (detail::RateAlone<System, V, D> || rated_together<V, D>) {
+        if constexpr (RateAlone<System, V, D> || rated_together<V, D>) {
             constexpr double largest = std::numeric_limits<double>::max();
             if (!(std::fabs(rate) <= largest)) return replaced_rate(t, x, dxdt, scale);
         }
@@ -167,7 +156,7 @@ public:
     [[nodiscard, gnu::always_inline]] double raw_rate(double t, const V& x, const D& dxdt,
                                                       double scale) const
     {
-        if constexpr (detail::RateAlone<System, V, D>) {
+        if constexpr (RateAlone<System, V, D>) {
             return known_rate(t, x, dxdt);
         } else if constexpr (rated_together<V, D>) {
             return rate_of_all(t, x, dxdt);
@@ -180,24 +169,22 @@ private:
     /// Whether the system gives its rates, at a state, only all together.
     template <class V, class D>
     static constexpr bool rated_together =
-        std::is_same_v<V, D> && !detail::RateAlone<System, V, D> &&
-        detail::RatesTogether<System, V>;
+        std::is_same_v<V, D> && !RateAlone<System, V, D> && RatesTogether<System, V>;
 
     /// The rate in closed form.
     template <class V, class D>
     [[nodiscard, gnu::always_inline]] double known_rate(double t, const V& x, const D& dxdt) const
     {
-        if constexpr (detail::RateByDuals<System, V> && !detail::RateWritten<System, V, D>) {
-            return detail::rate_by_duals(
-                *system_, at_.which,
-                detail::Along{at_.mode, t, x, dxdt, at_.backward ? -1.0 : 1.0});
+        if constexpr (RateByDuals<System, V> && !RateWritten<System, V, D>) {
+            return rate_by_duals(*system_, at_.which,
+                                 Along{at_.mode, t, x, dxdt, at_.backward ? -1.0 : 1.0});
         } else {
             if (!at_.backward) return call_rate(t, x, dxdt);
             if constexpr (sees_rate<V, D>) {
-                const detail::NegatedView<D> forward(dxdt);
+                const NegatedView<D> forward(dxdt);
                 return -call_rate(t, x, forward);
             } else {
-                return -call_rate(t, x, detail::negated(dxdt));
+                return -call_rate(t, x, negated(dxdt));
             }
         }
     }
@@ -205,7 +192,7 @@ private:
     template <class V, class D>
     [[nodiscard, gnu::always_inline]] double call_rate(double t, const V& x, const D& dxdt) const
     {
-        return detail::call_rate(*system_, at_.which, detail::Along{at_.mode, t, x, dxdt});
+        return call_rate(*system_, at_.which, Along{at_.mode, t, x, dxdt});
     }
 
     /// The rate where the closed form has none. Its evaluations are not counted.
@@ -228,8 +215,7 @@ private:
         const double ahead = moved(t, x, dxdt, delta);
         const double behind = moved(t, x, dxdt, -delta);
         const double central = (ahead - behind) / (2 * delta);
-        return std::isfinite(central) ? central
-                                      : detail::one_sided(value(t, x), ahead, behind, delta);
+        return std::isfinite(central) ? central : one_sided(value(t, x), ahead, behind, delta);
     }
 
     /// The guard after a time `s` along a straight line.
@@ -237,12 +223,12 @@ private:
     [[nodiscard]] double moved(double t, const V& x, const D& dxdt, double s) const
     {
         const double later = at_.backward ? t - s : t + s;
-        using Moved = detail::MovedView<V, D>;
+        using Moved = MovedView<V, D>;
         if constexpr (sees<Moved>) {
             return value(later, Moved(x, s, dxdt));
         } else {
             V there = x;
-            detail::move(there, x, s, dxdt);
+            move(there, x, s, dxdt);
             return value(later, there);
         }
     }
@@ -251,8 +237,7 @@ private:
     template <class V>
     [[nodiscard]] double one_of_all(double t, const V& x) const
     {
-        return one_of(
-            [&](std::span<double> all) { detail::call_guards(*system_, at_.mode, t, x, all); });
+        return one_of([&](std::span<double> all) { call_guards(*system_, at_.mode, t, x, all); });
     }
 
     /// One rate of a system that computes its rates only all together.
@@ -260,10 +245,10 @@ private:
     {
         const auto along = [&](const X& forward) {
             return one_of([&](std::span<double> all) {
-                detail::call_rates(*system_, detail::Along<X>{at_.mode, t, x, forward}, all);
+                call_rates(*system_, Along<X>{at_.mode, t, x, forward}, all);
             });
         };
-        return at_.backward ? -along(detail::negated(dxdt)) : along(dxdt);
+        return at_.backward ? -along(negated(dxdt)) : along(dxdt);
     }
 
     /// This guard's number among those that `compute` writes for all guards.
@@ -286,4 +271,4 @@ private:
     Crossing crossing_;
 };
 
-}  // namespace ricochet
+}  // namespace ricochet::detail

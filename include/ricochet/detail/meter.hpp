@@ -25,50 +25,10 @@
 #include <limits>
 
 #include "ricochet/detail/arithmetic.hpp"
+#include "ricochet/meter_options.hpp"
 #include "ricochet/run.hpp"
 
-namespace ricochet {
-
-/// How `Metered` decides.
-struct MeterOptions {
-    enum class Decision : std::uint8_t {
-        measured,  ///< by costs sampled with a clock
-        counted,   ///< by the costs given here, so that the same run always makes the same choices
-        always,    ///< the network is evaluated whenever possible
-        never,
-        every_step,  ///< every step is checked, and nothing is planned
-    };
-    Decision decision = Decision::measured;
-    /// [s] Cost of a check of the guard, of an inference and of a step, if `counted`; not
-    /// negative, and the step above 0.
-    double guard = 0;
-    double network = 0;
-    double step = 0;
-    /// Fraction of the run's time that useless trials may cost, in [0, 1].
-    double trials = 0.01;
-    std::uint64_t piece = 128;  ///< steps between decisions, at least 1
-};
-
-/// Measurements of a meter so far. Costs in seconds, 0 before the first sample.
-struct MeterReading {
-    double guard = 0;    ///< cost of a check
-    double network = 0;  ///< cost of an inference
-    double step = 0;     ///< cost of a step without checks and inferences, in the best alternative
-    std::uint64_t asked = 0;
-    std::uint64_t cleared = 0;  ///< inferences that cleared something
-    double asking = 0;          ///< cost of a step while the network is asked; 0: never tried
-    double not_asking = 0;      ///< cost of a step while it is not, in the better alternative
-    double checking = 0;        ///< cost of a step while every one is checked; 0: never tried
-    bool pays = false;          ///< asking the network pays
-    bool checks = false;        ///< checking every step is cheapest
-
-    [[nodiscard]] double share_cleared() const noexcept
-    {
-        return asked > 0 ? static_cast<double>(cleared) / static_cast<double>(asked) : 0;
-    }
-};
-
-namespace detail {
+namespace ricochet::detail {
 
 /// A detector whose network is metered.
 template <class Detector>
@@ -89,8 +49,8 @@ public:
     void add(double sample) noexcept
     {
         ++samples_;
-        if (samples_ > 1) sample = detail::least_of(sample, 3 * value_);
-        const double weight = detail::greatest_of(1.0 / static_cast<double>(samples_), 1.0 / 16);
+        if (samples_ > 1) sample = least_of(sample, 3 * value_);
+        const double weight = greatest_of(1.0 / static_cast<double>(samples_), 1.0 / 16);
         value_ += weight * (sample - value_);
     }
 
@@ -212,6 +172,4 @@ private:
     double total_ = 0;  ///< [s] total cost of the run
 };
 
-}  // namespace detail
-
-}  // namespace ricochet
+}  // namespace ricochet::detail

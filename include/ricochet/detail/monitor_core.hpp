@@ -7,39 +7,12 @@
 #include <span>
 #include <vector>
 
+#include "ricochet/cut.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/host_step.hpp"
 #include "ricochet/options.hpp"
 
-namespace ricochet {
-
-/// Decision of a monitor about a step.
-enum class Verdict {
-    stands,  ///< the step stands: continue from its end
-    cut,     ///< the step ends at a set of events: continue from `cut().after`, and `resume`
-    rests,   ///< the motion has come to rest: keep the state until `must_stop_at`, then `hold`
-    ended,   ///< the run is over; `outcome` says why
-};
-
-/// A set of events that ends a step, at the same instant for the whole set.
-template <class X>
-struct Cut {
-    double s = 0;  ///< [s] offset in the last step shown; 0 where the set follows another at the
-                   ///< same instant
-    Instant t;     ///< [s]
-    X before{};    ///< x⁻
-    X after{};     ///< x⁺
-    Mode mode_before = 0;
-    Mode mode_after = 0;
-    /// The guards that fired, in ascending order; for an accumulation the guard that came to rest.
-    std::vector<std::size_t> fired;
-    bool on_time = false;        ///< the set includes a time event
-    bool accumulation = false;   ///< `after` is the state that `rest` gives for the limit, `t` its
-                                 ///< time
-    bool state_changed = false;  ///< false: the host need not restart
-};
-
-namespace detail {
+namespace ricochet::detail {
 
 /// @throws std::invalid_argument because an array of a host does not have the size of the state.
 [[noreturn]] void throw_wrong_size(std::size_t expected, std::size_t found);
@@ -84,6 +57,4 @@ template <class X>
 [[nodiscard]] Owner<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
                                                 const Options& options, bool cuts_at_all);
 
-}  // namespace detail
-
-}  // namespace ricochet
+}  // namespace ricochet::detail

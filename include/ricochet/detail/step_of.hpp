@@ -20,9 +20,9 @@
 
 #include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/flow_caller.hpp"
-#include "ricochet/detail/step_control.hpp"
 #include "ricochet/detail/stepper_door.hpp"
 #include "ricochet/methods.hpp"
+#include "ricochet/step_control.hpp"
 
 // Components of a small state are computed one by one: as pairs, which g++ would form, they take
 // 1.3 times as long (rk4 on the ball), because of the shuffles between flow and sums.

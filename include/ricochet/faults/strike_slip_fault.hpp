@@ -13,7 +13,7 @@
 #include <string_view>
 #include <vector>
 
-#include "ricochet/faults/detail/fault_stiffness.hpp"
+#include "ricochet/faults/fault_stiffness.hpp"
 #include "ricochet/faults/parameters.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"

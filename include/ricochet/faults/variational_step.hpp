@@ -13,7 +13,7 @@
 #include <concepts>
 #include <cstddef>
 
-#include "ricochet/faults/detail/friction_stage.hpp"
+#include "ricochet/faults/friction_stage.hpp"
 #include "ricochet/faults/incremental.hpp"
 
 namespace ricochet {

@@ -18,11 +18,11 @@
 #include <vector>
 
 #include "ricochet/base/random.hpp"
-#include "ricochet/detail/gate.hpp"
+#include "ricochet/gate.hpp"
+#include "ricochet/learn/adam.hpp"
 #include "ricochet/learn/assessment.hpp"
 #include "ricochet/learn/data_set.hpp"
-#include "ricochet/learn/detail/adam.hpp"
-#include "ricochet/learn/detail/surface.hpp"
+#include "ricochet/learn/surface.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/system.hpp"
 

@@ -18,8 +18,8 @@
 #include "ricochet/gates.hpp"
 #include "ricochet/integrate.hpp"
 #include "ricochet/learn/classifier.hpp"
-#include "ricochet/learn/detail/gate_runs.hpp"
-#include "ricochet/learn/detail/surface.hpp"
+#include "ricochet/learn/gate_runs.hpp"
+#include "ricochet/learn/surface.hpp"
 
 namespace ricochet::learn {
 

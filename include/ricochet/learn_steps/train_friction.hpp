@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "ricochet/faults/friction.hpp"
-#include "ricochet/learn/detail/levenberg_marquardt.hpp"
+#include "ricochet/learn/levenberg_marquardt.hpp"
 
 namespace ricochet::learn {
 

@@ -37,13 +37,13 @@ concept Contacting = requires
 /// Result of a run. Events are impacts in flight, with the contact as `Event::guard`, and those of
 /// the mechanism's own guards, whose numbers follow those of the contacts; x = (q, v).
 template <Contacting System>
-struct ContactRun : Run<typename FreeFlight<System>::State> {
+struct ContactRun : Run<typename detail::FreeFlight<System>::State> {
     std::vector<MotionPhase> phases;
     std::vector<ContactForces> forces;  ///< at the sample times, of the steps that hold them
     ContactStatistics statistics;       ///< in place of the counts of all steps together
     ContactReport failure;  ///< set with `not_converged`, and with `non_finite` in contact
     /// With `HandOverOptions::estimate_error`.
-    std::optional<EstimatedError<typename FreeFlight<System>::State>> error;
+    std::optional<EstimatedError<typename detail::FreeFlight<System>::State>> error;
 };
 
 namespace detail {
@@ -51,7 +51,7 @@ namespace detail {
 template <class System>
 inline constexpr bool is_free_flight = false;
 template <class System>
-inline constexpr bool is_free_flight<FreeFlight<System>> = true;
+inline constexpr bool is_free_flight<detail::FreeFlight<System>> = true;
 
 /// The loop of a mechanism.
 template <class System, class X, class Stepping, class Detector>
@@ -101,9 +101,9 @@ private:
 /// A step in contact is one of Moreau's; its samples lie on the straight line between its ends. A
 /// snapshot continues with the same bits in any phase.
 template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
-class ContactMotion
-    : public Simulation<FreeFlight<System>, typename FreeFlight<System>::State, Stepping> {
-    using Flight = FreeFlight<System>;
+class ContactMotion : public Simulation<detail::FreeFlight<System>,
+                                        typename detail::FreeFlight<System>::State, Stepping> {
+    using Flight = detail::FreeFlight<System>;
     using Base = Simulation<Flight, typename Flight::State, Stepping>;
     static constexpr bool controlled =
         std::is_same_v<Stepping, ErrorControlled<typename Stepping::method>>;
@@ -212,7 +212,7 @@ template <Contacting System, class Stepping = ErrorControlled<Dopri5>>
         return ContactMotion<System, Stepping>(system, q, v, finer).take();
     };
     run.error = detail::estimated_error(run, with_part, [](const ContactRun<System>& of) {
-        using X = typename FreeFlight<System>::State;
+        using X = typename detail::FreeFlight<System>::State;
         return detail::ComparedRun<X>{of.outcome, of.x, of.trajectory.x};
     });
     return run;

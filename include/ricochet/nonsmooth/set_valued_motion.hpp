@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/nonsmooth/detail/composite_step.hpp"
+#include "ricochet/nonsmooth/composite_step.hpp"
 #include "ricochet/nonsmooth/detail/false_position.hpp"
 #include "ricochet/nonsmooth/detail/inclusion_sizes.hpp"
 #include "ricochet/nonsmooth/detail/padded_motion.hpp"

@@ -11,8 +11,8 @@
 #include <variant>
 #include <vector>
 
-#include "ricochet/detail/step_control.hpp"
 #include "ricochet/nn/mlp.hpp"
+#include "ricochet/step_control.hpp"
 
 namespace ricochet {
 

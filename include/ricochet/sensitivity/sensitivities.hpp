@@ -14,9 +14,9 @@
 #include <vector>
 
 #include "ricochet/integrate.hpp"
-#include "ricochet/sensitivity/detail/directions.hpp"
 #include "ricochet/sensitivity/detail/dual_parameter.hpp"
-#include "ricochet/sensitivity/detail/undefined.hpp"
+#include "ricochet/sensitivity/directions.hpp"
+#include "ricochet/sensitivity/undefined.hpp"
 #include "ricochet/sensitivity/variational.hpp"
 
 namespace ricochet {

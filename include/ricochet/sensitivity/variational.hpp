@@ -22,10 +22,10 @@
 #include "ricochet/detail/refusals.hpp"
 #include "ricochet/detail/scratch.hpp"
 #include "ricochet/options.hpp"
-#include "ricochet/sensitivity/detail/directions.hpp"
 #include "ricochet/sensitivity/detail/linearization.hpp"
 #include "ricochet/sensitivity/detail/saltation.hpp"
-#include "ricochet/sensitivity/detail/undefined.hpp"
+#include "ricochet/sensitivity/directions.hpp"
+#include "ricochet/sensitivity/undefined.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet {

@@ -4,7 +4,7 @@
 #include <numbers>
 #include <string_view>
 
-#include "ricochet/systems/detail/friction_oscillator.hpp"
+#include "ricochet/systems/friction_oscillator.hpp"
 
 namespace ricochet {
 

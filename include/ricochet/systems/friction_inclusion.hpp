@@ -5,8 +5,8 @@
 #include <cmath>
 #include <string_view>
 
-#include "ricochet/nonsmooth/detail/linear_cases.hpp"
-#include "ricochet/systems/detail/friction_oscillator.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
+#include "ricochet/systems/friction_oscillator.hpp"
 
 namespace ricochet {
 

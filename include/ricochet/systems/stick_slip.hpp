@@ -3,7 +3,7 @@
 
 #include <string_view>
 
-#include "ricochet/systems/detail/friction_oscillator.hpp"
+#include "ricochet/systems/friction_oscillator.hpp"
 
 namespace ricochet {
 

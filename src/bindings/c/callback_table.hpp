@@ -58,7 +58,7 @@ class CallbackTable {
         return guard(door, which, mode, t, moved);
     }
 
-    /// The rate of the guard by a central difference, as `GuardView::difference`.
+    /// The rate of the guard by a central difference, as `detail::GuardView::difference`.
     static double difference(void* door, GuardInMode of, detail::ScaledTime time, const X& x,
                              const X& dxdt)
     {

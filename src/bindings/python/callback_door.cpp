@@ -291,7 +291,7 @@ private:
     }
 
     /// In closed form where that is finite, else the difference along the flow; see
-    /// `GuardView::rate`.
+    /// `detail::GuardView::rate`.
     [[nodiscard]] double rate(GuardInMode of, detail::ScaledTime time, const State& x,
                               const State& dxdt)
     {

@@ -84,7 +84,7 @@ public:
             table.clears = [](const void* at, void*, const detail::StepState<State>& step,
                               std::uint64_t& calls) {
                 detail::Door<AskedSystem, State> door(from(at).system_, step.x0);
-                const GuardView<AskedSystem, State> guard(
+                const detail::GuardView<AskedSystem, State> guard(
                     from(at).system_, calls, {.mode = step.mode, .backward = step.backward});
                 return from(at).Detector::clears(
                     guard, detail::StepToCome<AskedSystem, State>(door, step));

@@ -4,7 +4,7 @@
 #include <memory>
 #include <optional>
 
-#include "ricochet/detail/gate.hpp"
+#include "ricochet/gate.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 

@@ -1,4 +1,4 @@
-#include "ricochet/detail/gate.hpp"
+#include "ricochet/gate.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "ricochet/detail/step_control.hpp"
+#include "ricochet/step_control.hpp"
 
 namespace ricochet::detail {
 

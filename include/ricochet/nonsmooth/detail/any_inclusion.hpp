@@ -27,9 +27,9 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/guard.hpp"
 #include "ricochet/nonsmooth/detail/branch_terms.hpp"
-#include "ricochet/nonsmooth/detail/linear_cases.hpp"
 #include "ricochet/nonsmooth/detail/ordered_products.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
 
 namespace ricochet {

@@ -8,7 +8,7 @@
 #include <limits>
 #include <span>
 
-#include "ricochet/nonsmooth/detail/branch_modes.hpp"
+#include "ricochet/nonsmooth/branch_modes.hpp"
 
 namespace ricochet::detail {
 

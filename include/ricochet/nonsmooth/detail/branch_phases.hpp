@@ -19,7 +19,7 @@
 #include "ricochet/detail/small_state.hpp"
 #include "ricochet/guard.hpp"
 #include "ricochet/methods.hpp"
-#include "ricochet/nonsmooth/detail/composite_step.hpp"
+#include "ricochet/nonsmooth/composite_step.hpp"
 
 namespace ricochet::detail {
 

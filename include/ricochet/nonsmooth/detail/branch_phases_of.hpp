@@ -10,8 +10,8 @@
 #include <span>
 #include <vector>
 
+#include "ricochet/nonsmooth/branch_modes.hpp"
 #include "ricochet/nonsmooth/detail/branch_kernels.hpp"
-#include "ricochet/nonsmooth/detail/branch_modes.hpp"
 #include "ricochet/nonsmooth/detail/false_position.hpp"
 #include "ricochet/nonsmooth/detail/held_reactions.hpp"
 #include "ricochet/nonsmooth/detail/implicit_phases.hpp"

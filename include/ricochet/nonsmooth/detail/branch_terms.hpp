@@ -20,7 +20,7 @@
 #include <utility>
 
 #include "ricochet/guard.hpp"
-#include "ricochet/nonsmooth/detail/linear_cases.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
 
 namespace ricochet::detail {
 

@@ -8,22 +8,12 @@
 #include <vector>
 
 #include "ricochet/detail/core.hpp"
+#include "ricochet/nonsmooth/contact_results.hpp"
 #include "ricochet/nonsmooth/detail/contact_steps.hpp"
 #include "ricochet/nonsmooth/detail/free_flight.hpp"
 #include "ricochet/nonsmooth/hand_over_run.hpp"
 
-namespace ricochet {
-
-/// Counts over one run with contacts.
-struct ContactStatistics {
-    Statistics event_driven;
-    TimeSteppingStatistics time_stepping;
-    std::uint64_t to_contact = 0;  ///< hand-overs, including a start in contact
-    std::uint64_t to_flight = 0;
-    double contact_time = 0;  ///< [s] duration of the motion in contact
-};
-
-namespace detail {
+namespace ricochet::detail {
 
 /// What a run of a mechanism consists of, besides its start and its `Options`.
 template <class C>
@@ -69,6 +59,4 @@ Owner<ContactRunner<std::vector<double>>> make_contact_run(
     ContactSetup<std::vector<double>>&& setup, const std::vector<double>& x0,
     const Options& options);
 
-}  // namespace detail
-
-}  // namespace ricochet
+}  // namespace ricochet::detail

@@ -11,17 +11,10 @@
 #include <limits>
 #include <vector>
 
+#include "ricochet/nonsmooth/contact_results.hpp"
 #include "ricochet/nonsmooth/detail/moreau_step.hpp"
 
-namespace ricochet {
-
-/// Forces in contact, the means over a step: impulses by its length.
-struct ContactForces {
-    Eigen::VectorXd contacts;     ///< [N] of each contact, its normal one first; zero where open
-    Eigen::VectorXd coordinates;  ///< of dry friction of each coordinate, zero without it
-};
-
-namespace detail {
+namespace ricochet::detail {
 
 /// Start of a step.
 struct ContactStart {
@@ -245,6 +238,4 @@ private:
     State probe_;
 };
 
-}  // namespace detail
-
-}  // namespace ricochet
+}  // namespace ricochet::detail

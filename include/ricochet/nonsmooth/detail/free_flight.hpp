@@ -23,13 +23,11 @@
 #include "ricochet/detail/declarations.hpp"
 #include "ricochet/detail/guard_view.hpp"
 #include "ricochet/detail/own_mode.hpp"
+#include "ricochet/nonsmooth/contact_problem.hpp"
 #include "ricochet/nonsmooth/detail/any_mechanism.hpp"
-#include "ricochet/nonsmooth/detail/contact_problem.hpp"
 #include "ricochet/system.hpp"
 
-namespace ricochet {
-
-namespace detail {
+namespace ricochet::detail {
 
 /// Kinds of phases of a mechanism. Bit k of a kind of flight: the k-th coordinate with dry friction
 /// moves backward.
@@ -197,21 +195,19 @@ struct ContactPhaseOptions {
     bool events_only = false;  ///< the run ends where contact would begin
 };
 
-}  // namespace detail
-
 /// A mechanical system with the state x = (q, v). An impact allocates memory; flight does not. The
 /// impact of one contact without friction, or with one tangent, is computed in closed form: at
 /// restitution 1 it keeps the energy to rounding.
 template <class System>
-class FreeFlight : public detail::AnyFlight<System::coordinates> {
-    using Declared = detail::DeclaredBeside<System>;
+class FreeFlight : public AnyFlight<System::coordinates> {
+    using Declared = DeclaredBeside<System>;
     static constexpr std::size_t contacts = static_cast<std::size_t>(System::contacts);
 
 public:
     static constexpr int N = System::coordinates;
     static constexpr int C = System::contacts;
     static constexpr int D = 1 + System::tangents;
-    using State = typename detail::AnyFlight<N>::State;
+    using State = typename AnyFlight<N>::State;
 
 private:
     static constexpr bool has_guards = Guarded<Declared, State>;
@@ -222,23 +218,20 @@ public:
     static constexpr bool forward_only = true;
     static constexpr bool unchecked_names = true;  ///< those of the system are checked below
 
-    explicit FreeFlight(const System& system, const detail::ContactPhaseOptions& phases = {})
-        : FreeFlight::AnyFlight(detail::TypedMechanism<System>(system)),
+    explicit FreeFlight(const System& system, const ContactPhaseOptions& phases = {})
+        : FreeFlight::AnyFlight(TypedMechanism<System>(system)),
           declared_(system),
           phases_(phases),
           own_guards_(has_guards ? guard_count_of<State>(declared_) : 0)
     {
-        static_assert(detail::check_system<Declared, State>());
+        static_assert(check_system<Declared, State>());
         static_assert(
             !Resting<Declared, State>,
             "ricochet: found a mechanism with `rest`; expected none, since contact takes over "
             "where impacts accumulate");
     }
 
-    [[nodiscard]] const detail::ContactPhaseOptions& phase_options() const noexcept
-    {
-        return phases_;
-    }
+    [[nodiscard]] const ContactPhaseOptions& phase_options() const noexcept { return phases_; }
     /// Number of modes of the system; 0: not declared.
     [[nodiscard]] std::size_t own_mode_count() const
     {
@@ -246,7 +239,7 @@ public:
     }
     [[nodiscard]] std::size_t mode_count() const
     {
-        return static_cast<std::size_t>(this->kinds().count()) * detail::own_modes;
+        return static_cast<std::size_t>(this->kinds().count()) * own_modes;
     }
 
     void flow(Mode mode, double t, const State& x, State& dxdt) const
@@ -279,16 +272,16 @@ public:
     [[nodiscard]] bool enabled(std::size_t which, Mode mode) const
     {
         if (which < contacts || which >= event_guards()) return !is_asleep(which, mode);
-        if constexpr (detail::EnabledIn<Declared>) {
-            return detail::call_enabled_in(declared_, which - contacts, detail::own_mode(mode));
+        if constexpr (EnabledIn<Declared>) {
+            return call_enabled_in(declared_, which - contacts, own_mode(mode));
         }
         return true;
     }
     [[nodiscard]] bool enabled(std::size_t which, Mode mode, double t,
-                               const State& x) const requires detail::EnabledAt<Declared, State>
+                               const State& x) const requires EnabledAt<Declared, State>
     {
         if (which < contacts || which >= event_guards()) return true;
-        return detail::call_enabled_at(declared_, which - contacts, detail::own_mode(mode), t, x);
+        return call_enabled_at(declared_, which - contacts, own_mode(mode), t, x);
     }
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
     {
@@ -322,29 +315,29 @@ public:
         std::size_t closed = 0;
         while (closed < all.size() && all[closed] < contacts) ++closed;
         if (closed > 0) this->collide(all.first(closed), t, x);
-        const Mode own = detail::own_mode(mode);
+        const Mode own = own_mode(mode);
         return reached(mode, own_resets(all.subspan(closed), fired.time_event(), own, t, x));
     }
     [[nodiscard]] Mode time_reset(Mode mode, double t,
-                                  State& x) const requires detail::TimeResetting<Declared, State>
+                                  State& x) const requires TimeResetting<Declared, State>
     {
-        return reached(mode, detail::call_time_reset(declared_, detail::own_mode(mode), t, x));
+        return reached(mode, call_time_reset(declared_, own_mode(mode), t, x));
     }
 
     // --- time events ---
 
-    [[nodiscard]] const Times& time_events() const requires detail::ListsTimes<Declared>
+    [[nodiscard]] const Times& time_events() const requires ListsTimes<Declared>
     {
-        return detail::times_of(declared_);
+        return times_of(declared_);
     }
-    [[nodiscard]] double next_time_event(double t) const requires detail::TimedByFunction<Declared>
+    [[nodiscard]] double next_time_event(double t) const requires TimedByFunction<Declared>
     {
         return declared_.next_time_event(t);
     }
     [[nodiscard]] double next_time_event(Mode mode, double t, const State& x) const requires
         TimedByState<Declared, State>
     {
-        return detail::call_timer(declared_, detail::own_mode(mode), t, x);
+        return call_timer(declared_, own_mode(mode), t, x);
     }
 
 private:
@@ -356,27 +349,27 @@ private:
     [[nodiscard]] GuardView<Declared, State> own_guard(std::size_t which, Mode mode,
                                                        std::uint64_t& calls) const
     {
-        return {declared_, calls, {which - contacts, detail::own_mode(mode)}};
+        return {declared_, calls, {which - contacts, own_mode(mode)}};
     }
     /// The size of a velocity, or of its rate, in the direction in which the coordinate moves.
     [[nodiscard]] double speed(std::size_t k, Mode mode, const State& x) const
     {
         const double v = x[static_cast<std::size_t>(N + this->dry()[k].coordinate)];
-        return detail::FlightKinds::is_backward(k, mode) ? -v : v;
+        return FlightKinds::is_backward(k, mode) ? -v : v;
     }
     /// The mode after a reset, or one that no system has.
     [[nodiscard]] Mode reached(Mode before, Mode own) const
     {
         const std::size_t modes = own_mode_count();
-        if (own >= (modes > 0 ? modes : detail::own_modes - 1)) return static_cast<Mode>(-1);
-        return detail::kind_of_phase(before) * detail::own_modes + own;
+        if (own >= (modes > 0 ? modes : own_modes - 1)) return static_cast<Mode>(-1);
+        return kind_of_phase(before) * own_modes + own;
     }
     /// Applies the resets that the system declares, in the order of its guards, a time event last.
     [[nodiscard]] Mode own_resets(std::span<const std::size_t> fired, bool time_event, Mode mode,
                                   double t, State& x) const;
 
     Declared declared_;
-    detail::ContactPhaseOptions phases_;
+    ContactPhaseOptions phases_;
     std::size_t own_guards_;
 };
 
@@ -390,17 +383,17 @@ Mode FreeFlight<System>::own_resets(std::span<const std::size_t> fired, bool tim
             const bool is_own = i < event_guards();
             if (is_own && guard_info(i).resets) own.push_back(i - contacts);
         }
-        if constexpr (detail::ResetsTogether<Declared, State>) {
+        if constexpr (ResetsTogether<Declared, State>) {
             const FiredGuards set(own, time_event);
-            if (!own.empty()) return detail::call_reset_set(declared_, set, mode, t, x);
+            if (!own.empty()) return call_reset_set(declared_, set, mode, t, x);
         } else {
-            for (const std::size_t i : own) mode = detail::call_reset(declared_, i, mode, t, x);
+            for (const std::size_t i : own) mode = call_reset(declared_, i, mode, t, x);
         }
     }
-    if constexpr (detail::TimeResetting<Declared, State>) {
-        if (time_event) return detail::call_time_reset(declared_, mode, t, x);
+    if constexpr (TimeResetting<Declared, State>) {
+        if (time_event) return call_time_reset(declared_, mode, t, x);
     }
     return mode;
 }
 
-}  // namespace ricochet
+}  // namespace ricochet::detail

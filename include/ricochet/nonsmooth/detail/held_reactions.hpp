@@ -13,7 +13,7 @@
 #include <cmath>
 #include <limits>
 
-#include "ricochet/nonsmooth/detail/branch_modes.hpp"
+#include "ricochet/nonsmooth/branch_modes.hpp"
 
 namespace ricochet::detail {
 

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/nonsmooth/detail/branch_modes.hpp"
+#include "ricochet/nonsmooth/branch_modes.hpp"
 #include "ricochet/nonsmooth/detail/law.hpp"
 #include "ricochet/nonsmooth/detail/least_reaction.hpp"
 #include "ricochet/nonsmooth/detail/padded_motion.hpp"

@@ -12,8 +12,8 @@
 
 #include "ricochet/detail/declarations.hpp"
 #include "ricochet/guard.hpp"
-#include "ricochet/nonsmooth/detail/linear_cases.hpp"
 #include "ricochet/nonsmooth/inclusion.hpp"
+#include "ricochet/nonsmooth/linear_cases.hpp"
 
 namespace ricochet::detail {
 

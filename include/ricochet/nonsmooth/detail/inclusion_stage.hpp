@@ -17,11 +17,10 @@
 #include <limits>
 
 #include "ricochet/nonsmooth/detail/any_inclusion.hpp"
+#include "ricochet/nonsmooth/stage_options.hpp"
 #include "ricochet/phase.hpp"
 
-namespace ricochet {
-
-namespace detail {
+namespace ricochet::detail {
 
 template <int N, int M>
 struct RICOCHET_ALIGNED Stage {
@@ -31,24 +30,6 @@ struct RICOCHET_ALIGNED Stage {
     double sigma = 1;
     Eigen::Matrix<double, N, 1> q;
 };
-
-}  // namespace detail
-
-enum class StageMethod {
-    automatic,    ///< cases for boxes of up to four reactions, else Newton's method
-    cases,        ///< Newton's method on f alone, the inequality solved exactly by cases
-    newton,       ///< semismooth Newton on equation and law together
-    fixed_point,  ///< projected fixed point with an adapted step, as in the source
-};
-
-struct StageOptions {
-    StageMethod method = StageMethod::automatic;
-    double tolerance = 1e-12;  ///< of the residual
-    int max_iterations = 50;   ///< of the fixed point: a hundred times as many
-    bool line_search = true;   ///< of `newton`
-};
-
-namespace detail {
 
 /// Writes the inverse of the first n rows and columns of a, n <= 4, and zeros elsewhere. The
 /// formula is that of n.
@@ -248,6 +229,4 @@ struct RICOCHET_ALIGNED StageScratch {
     }
 };
 
-}  // namespace detail
-
-}  // namespace ricochet
+}  // namespace ricochet::detail

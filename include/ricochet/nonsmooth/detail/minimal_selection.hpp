@@ -8,7 +8,7 @@
 #include <string>
 #include <type_traits>
 
-#include "ricochet/nonsmooth/detail/composite_step.hpp"
+#include "ricochet/nonsmooth/composite_step.hpp"
 
 namespace ricochet {
 

@@ -9,21 +9,11 @@
 #include <limits>
 #include <vector>
 
+#include "ricochet/nonsmooth/contact_problem.hpp"
+#include "ricochet/nonsmooth/contact_results.hpp"
 #include "ricochet/nonsmooth/detail/any_mechanism.hpp"
-#include "ricochet/nonsmooth/detail/contact_problem.hpp"
 
-namespace ricochet {
-
-/// Counts over one motion by time stepping.
-struct TimeSteppingStatistics {
-    std::uint64_t steps = 0;
-    std::uint64_t problems = 0;    ///< steps with a closed contact, or with dry friction
-    std::uint64_t iterations = 0;  ///< iterations of Newton's method in them
-    std::uint64_t sweeps = 0;
-    std::uint64_t unsolved = 0;  ///< steps that were repeated at half the length
-};
-
-namespace detail {
+namespace ricochet::detail {
 
 /// How often a step is halved whose contact problem is not solved: another length gives another
 /// problem, which may be easier.
@@ -207,6 +197,4 @@ private:
     ContactReport failure_;
 };
 
-}  // namespace detail
-
-}  // namespace ricochet
+}  // namespace ricochet::detail

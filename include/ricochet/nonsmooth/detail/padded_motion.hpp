@@ -8,7 +8,7 @@
 #include <optional>
 #include <utility>
 
-#include "ricochet/nonsmooth/detail/composite_step.hpp"
+#include "ricochet/nonsmooth/composite_step.hpp"
 #include "ricochet/nonsmooth/step_controllers.hpp"
 #include "ricochet/run.hpp"
 

@@ -4,7 +4,7 @@
 #pragma once
 
 #include "ricochet/nonsmooth/detail/inclusion_stage.hpp"
-#include "ricochet/nonsmooth/detail/semismooth_newton.hpp"
+#include "ricochet/nonsmooth/semismooth_newton.hpp"
 
 namespace ricochet::detail {
 

@@ -16,7 +16,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "ricochet/nonsmooth/detail/branch_modes.hpp"
+#include "ricochet/nonsmooth/branch_modes.hpp"
 
 namespace ricochet::detail {
 

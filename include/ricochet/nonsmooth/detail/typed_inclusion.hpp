@@ -11,9 +11,7 @@
 #include "ricochet/nonsmooth/detail/inclusion_declarations.hpp"
 #include "ricochet/nonsmooth/detail/inclusion_sizes.hpp"
 
-namespace ricochet {
-
-namespace detail {
+namespace ricochet::detail {
 
 /// to = from, in the components that both have; zero in the others.
 template <class From, class To>
@@ -512,11 +510,9 @@ template <class System>
     return inclusion_of<state_size<System>, reaction_size<System>>(system);
 }
 
-}  // namespace detail
-
 /// A system with its constant matrices, which have been checked.
 template <Inclusion System>
-class InclusionMatrices : public detail::AnyMatrices<state_size<System>, reaction_size<System>> {
+class InclusionMatrices : public AnyMatrices<state_size<System>, reaction_size<System>> {
 public:
     static constexpr int N = state_size<System>;
     static constexpr int M = reaction_size<System>;
@@ -524,9 +520,9 @@ public:
     /// @throws std::invalid_argument for a singular or non-finite A, or E or G that are not
     /// finite.
     explicit InclusionMatrices(const System& system)
-        : InclusionMatrices::AnyMatrices(detail::exact_inclusion(system))
+        : InclusionMatrices::AnyMatrices(exact_inclusion(system))
     {
-        static_assert(detail::check_own_size<N, M>());
+        static_assert(check_own_size<N, M>());
     }
 
     [[nodiscard]] const System& system() const noexcept
@@ -535,4 +531,4 @@ public:
     }
 };
 
-}  // namespace ricochet
+}  // namespace ricochet::detail

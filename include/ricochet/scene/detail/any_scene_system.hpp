@@ -11,16 +11,9 @@
 #include "ricochet/guard.hpp"
 #include "ricochet/instant.hpp"
 #include "ricochet/scene/scene.hpp"
+#include "ricochet/scene/system_disc.hpp"
 
-namespace ricochet {
-
-/// A disc of a system, as its state places it.
-struct SystemDisc {
-    Vector2 at{};        ///< [m] centre
-    Vector2 velocity{};  ///< [m/s]
-};
-
-namespace detail {
+namespace ricochet::detail {
 
 /// A monitor's verdict on a step; see `Verdict`.
 enum class StepVerdict { stands, cut, rests, ended };
@@ -85,6 +78,4 @@ public:
     [[nodiscard]] virtual std::unique_ptr<SystemEvents> events() const = 0;
 };
 
-}  // namespace detail
-
-}  // namespace ricochet
+}  // namespace ricochet::detail

@@ -14,7 +14,7 @@
 #include "ricochet/detail/scalar_probe.hpp"
 #include "ricochet/dual.hpp"
 #include "ricochet/guard.hpp"
-#include "ricochet/sensitivity/detail/directions.hpp"
+#include "ricochet/sensitivity/directions.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet::detail {

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ricochet/sensitivity/detail/undefined.hpp"
+#include "ricochet/sensitivity/undefined.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet::detail {

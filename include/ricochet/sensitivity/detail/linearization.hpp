@@ -27,8 +27,8 @@
 #include "ricochet/detail/dual_derivatives.hpp"
 #include "ricochet/detail/scratch.hpp"
 #include "ricochet/guard.hpp"
-#include "ricochet/sensitivity/detail/differences.hpp"
-#include "ricochet/sensitivity/detail/directions.hpp"
+#include "ricochet/sensitivity/differences.hpp"
+#include "ricochet/sensitivity/directions.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet::detail {

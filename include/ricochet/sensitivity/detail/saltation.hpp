@@ -34,10 +34,10 @@
 
 #include "ricochet/guard.hpp"
 #include "ricochet/options.hpp"
-#include "ricochet/sensitivity/detail/directions.hpp"
 #include "ricochet/sensitivity/detail/event_motion.hpp"
 #include "ricochet/sensitivity/detail/linearization.hpp"
-#include "ricochet/sensitivity/detail/undefined.hpp"
+#include "ricochet/sensitivity/directions.hpp"
+#include "ricochet/sensitivity/undefined.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet::detail {

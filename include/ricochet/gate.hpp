@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // A trained gate: the predictions of a network about the guards of a system, for several steps.
 //
 //     horizon gate   one output for each horizon: no guard has its event within so many seconds
@@ -15,7 +13,7 @@
 #include <string_view>
 
 #include "ricochet/base/detail/owner.hpp"
-#include "ricochet/detail/gate_features.hpp"
+#include "ricochet/gate_features.hpp"
 #include "ricochet/nn/mlp.hpp"
 #include "ricochet/nn/model.hpp"
 #include "ricochet/system.hpp"

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Nonlinear least squares.
 #pragma once
 

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Derivatives along a direction by differences, for functions without a closed form.
 //
 // The five-point formula is of fourth order:

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // The branches of an inclusion as the modes of a hybrid system.
 //
 // Where every reaction is at one of its bounds, or held, the inclusion
@@ -24,7 +22,7 @@
 
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/filippov_motion.hpp"
-#include "ricochet/nonsmooth/detail/composite_step.hpp"
+#include "ricochet/nonsmooth/composite_step.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet {
@@ -76,7 +74,7 @@ public:
     static constexpr Mode no_flow = branch_modes + 1;
     static constexpr Mode empty = branch_modes + 2;
 
-    /// @throws std::invalid_argument for matrices that `InclusionMatrices` refuses.
+    /// @throws std::invalid_argument for matrices that `detail::InclusionMatrices` refuses.
     explicit AnyModes(const AnyInclusion<N, M>& inclusion);
 
     [[nodiscard]] const Matrices& matrices() const noexcept { return matrices_; }

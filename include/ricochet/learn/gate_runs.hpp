@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // The runs of a system on which a gate is trained and measured.
 #pragma once
 

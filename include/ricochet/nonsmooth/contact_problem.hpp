@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Several contacts with friction together, at one instant or over one step.
 //
 //     u = W p + q,     for every contact c:

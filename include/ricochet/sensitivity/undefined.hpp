@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Reasons why a derivative through an event does not exist.
 #pragma once
 

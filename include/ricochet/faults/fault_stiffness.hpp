@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // The stiffness K of a fault of n x n elements: products, bounds of its spectrum, solutions.
 //
 // Elements are numbered along x first, then along depth. K is symmetric and positive definite.

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Linear variational inequalities of a few unknowns, solved case by case.
 //
 //     y = W reaction + y0,   each pair (reaction_i, y_i) on its own monotone graph

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // One implicit stage of rate-and-state friction: the state is eliminated, then the slip rate
 // is found.
 //

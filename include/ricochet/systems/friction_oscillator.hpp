@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // A mass on a spring that rubs on a belt, with slipping and sticking as modes.
 #pragma once
 

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Choice of the length of the next step.
 #pragma once
 

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Newton's method for equations that are only piecewise smooth.
 //
 // The problem provides its own linear algebra: `residual(x, F)` writes F(x), and

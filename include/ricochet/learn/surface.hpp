@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Training states sampled from the event surface backward.
 //
 // After Saunders, Steyer and Kuether, "Machine learning for event detection in

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Adam: stochastic gradient descent with a step per parameter.
 //
 // D. P. Kingma and J. Ba, "Adam: A method for stochastic optimization", ICLR

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Implicit steps of an inclusion: Bathe's composite step, backward Euler, theta.
 #pragma once
 
@@ -82,8 +80,8 @@ public:
     using State = StateWithReaction<N, M>;
     using Branches = BranchesOf<M>;
 
-    /// @throws std::invalid_argument for what `SchemeOptions` and `InclusionMatrices` refuse,
-    /// and for StageMethod::cases where the set is no box of at most four reactions.
+    /// @throws std::invalid_argument for what `SchemeOptions` and `detail::InclusionMatrices`
+    /// refuse, and for StageMethod::cases where the set is no box of at most four reactions.
     AnyStep(const AnyInclusion<N, M>& inclusion, const SchemeOptions& options);
     AnyStep(const AnyStep& other) : AnyStep(other.matrices_.inclusion(), other.options_) {}
     AnyStep& operator=(const AnyStep&) = delete;
@@ -240,8 +238,8 @@ class CompositeStep : public detail::AnyStep<state_size<System>, reaction_size<S
 public:
     static constexpr bool box = BoxSet<SetOf<System>>;
 
-    /// @throws std::invalid_argument for what `SchemeOptions` and `InclusionMatrices` refuse,
-    /// and for StageMethod::cases where the set is no box of at most four reactions.
+    /// @throws std::invalid_argument for what `SchemeOptions` and `detail::InclusionMatrices`
+    /// refuse, and for StageMethod::cases where the set is no box of at most four reactions.
     explicit CompositeStep(const System& system, const SchemeOptions& options = {})
         : CompositeStep::AnyStep(detail::exact_inclusion(system), options)
     {

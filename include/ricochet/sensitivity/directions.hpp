@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // The quantities with respect to which a run is differentiated.
 #pragma once
 
@@ -14,7 +12,7 @@
 #include <vector>
 
 #include "ricochet/guard.hpp"
-#include "ricochet/sensitivity/detail/differences.hpp"
+#include "ricochet/sensitivity/differences.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet {

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // The features of a state for a gate, by a recipe that its model names.
 //
 //     state            x
