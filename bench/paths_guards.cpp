@@ -102,6 +102,7 @@ private:
 template <class X>
 struct FarGuards {
     using State = X;
+    static constexpr bool resets = false;
     std::size_t guard_count;
 
     void flow(double /*t*/, const X& x, X& dxdt) const
@@ -121,6 +122,7 @@ struct FarGuards {
 
 struct FarGuard {
     using State = report::Two;
+    static constexpr bool resets = false;
 
     [[nodiscard]] static GuardInfo guard_info(std::size_t /*which*/) { return {.degree = 1}; }
     void flow(double /*t*/, const State& x, State& dxdt) const { dxdt = {x[1], -x[0]}; }

@@ -141,6 +141,7 @@ struct Spiral {
 /// fires.
 struct WatchedPendulum {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
 
     template <class X>
     void flow(double /*t*/, const X& x, X& dxdt) const noexcept

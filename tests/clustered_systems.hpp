@@ -15,6 +15,7 @@ namespace ricochet::test {
 ///     guard   x - offset[which], either direction
 struct Clustered {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
 
     static constexpr std::size_t guard_count = 4;
     static constexpr std::array<double, 4> offsets{0, 1e-8, 2e-8, 2e-7};

@@ -19,6 +19,7 @@ using HostState = std::array<double, 2>;
 /// The guard is the second component of the state.
 struct HostSystem {
     using State = HostState;
+    static constexpr bool resets = false;
 
     Crossing crossing = Crossing::falling;
 

@@ -153,6 +153,7 @@ struct Spiral {
 /// Motion that ends at its surface, beyond which the flow is not a number.
 struct Draining {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
     enum Kind { root, torricelli, logarithm };
     Kind kind = root;
 

@@ -136,6 +136,7 @@ struct Impacts {
 /// crossings that are close together. Each of them is a run of its own.
 struct NearTangentPairs {
     using State = Two;
+    static constexpr bool resets = false;
     static constexpr Crossing crossing = Crossing::either;
     double depth = 1e-4;
 
@@ -185,6 +186,7 @@ inline constexpr std::size_t tangent_phases = 32;
 
 struct Section {
     using State = Four;
+    static constexpr bool resets = false;
     static constexpr Crossing crossing = Crossing::rising;
 
     template <class T, class X>
@@ -224,6 +226,7 @@ struct Section {
 /// Solving Ordinary Differential Equations I, Springer, 1993, page 130.
 struct Arenstorf {
     using State = Four;
+    static constexpr bool resets = false;
     static constexpr Crossing crossing = Crossing::either;
 
     template <class T, class X>
@@ -434,6 +437,7 @@ struct Thermostats {
 /// A pendulum of 1 m, with n guards far below it.
 struct Watched {
     using State = Two;
+    static constexpr bool resets = false;
     std::size_t guards_ = 1;
 
     [[nodiscard]] std::size_t guard_count() const { return guards_; }

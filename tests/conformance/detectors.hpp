@@ -73,6 +73,7 @@ struct Cubic {
 /// The curve as the guard of a system whose state is the offset: its step is the step of the curve.
 struct CurveSystem {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
 
     Curve curve;
 

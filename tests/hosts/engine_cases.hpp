@@ -44,6 +44,7 @@ struct FallingBody {
 /// The same without a floor: passages of the height `level` are recorded.
 struct Gate {
     using State = FallingBody::State;
+    static constexpr bool resets = false;
     static constexpr Crossing crossing = Crossing::either;
     double level;
 

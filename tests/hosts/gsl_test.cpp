@@ -83,6 +83,7 @@ INSTANTIATE_TYPED_TEST_SUITE_P(Gsl, InHost, Methods);
 /// A point at a constant speed of 1 m/s, and a guard that dips below zero for 6 ms.
 struct Passing {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
     void flow(double /*t*/, const State& /*x*/, State& dxdt) const { dxdt[0] = 1; }
     template <class X>
     [[nodiscard]] double guard(double /*t*/, const X& x) const

@@ -109,6 +109,7 @@ struct TwoBalls {
 /// sin t, and a surface that lies by `depth` below its crests.
 struct Crests {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
     static constexpr Crossing crossing = Crossing::either;
     double depth;
 
@@ -129,6 +130,7 @@ struct Crests {
 /// 3, then on the other.
 struct Plateau {
     using State = std::array<double, 3>;
+    static constexpr bool resets = false;
     double sign;
 
     void flow(double /*t*/, const State& x, State& dxdt) const { dxdt = {1, 5 * x[2], -5 * x[1]}; }

@@ -262,6 +262,7 @@ TEST(NetworkBounds, RefusesHostileNetworks)
 /// Distance to the walls of a square room and to a pillar in it; a state of two components.
 struct Room {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
     static constexpr std::string_view name = "room";
     double pillar = 0.3;  ///< radius
     double slack = 1;     ///< of the guard per unit of distance

@@ -25,6 +25,7 @@ using State = std::array<double, 2>;
 
 /// A guard without a declared curvature, or anything else.
 struct Ramp {
+    static constexpr bool resets = false;
     void flow(double, const State&, State& dxdt) const { dxdt = {1, 0}; }
     [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
 };

@@ -10,7 +10,7 @@ using namespace ricochet;
 using X = std::array<double, 2>;
 
 // CASE 1: found fields with modes of their own; expected guards, resets and time events that take
-// CASE 2: found a member `gaurd`, which nothing calls; rename it to `guard`
+// CASE 2 alone: found a guard and no reset; expected a reset of that name or
 // CASE 3 alone: found fields with a flow, which Filippov does not call; expected void field(
 // CASE 4: found fields with guards of their own, but without a type State; expected `using
 // CASE 5: found a reset that is not const
@@ -25,6 +25,9 @@ struct Fields {
     using State = X;
 #endif
     static constexpr std::size_t surface_count = 1;
+#if CASE != 2 && CASE != 5
+    static constexpr bool resets = false;
+#endif
     [[nodiscard]] double surface(std::size_t, double, const X& x) const
     {
         return x[1];
@@ -35,11 +38,6 @@ struct Fields {
     }
 #if CASE == 1
     double guard(Mode, double, const X& x) const
-    {
-        return 1 - x[0];
-    }
-#elif CASE == 2
-    double gaurd(double, const X& x) const
     {
         return 1 - x[0];
     }

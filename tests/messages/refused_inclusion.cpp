@@ -9,7 +9,6 @@ using namespace ricochet;
 using State = Eigen::Vector2d;
 using Reaction = Eigen::Matrix<double, 1, 1>;
 
-// CASE 1: found a member `offest`, which nothing calls; rename it to `offset`
 // CASE 2: found a member `offset` whose parameters or result do not fit
 // CASE 3: found a member `observe` that is not const
 // CASE 4: found a member `observe` whose parameters or result do not fit
@@ -57,12 +56,7 @@ struct Block {
     {
         E << 0, 1;
     }
-#if CASE == 1
-    void offest(double, Reaction& s) const
-    {
-        s[0] = 0.2;
-    }
-#elif CASE == 2
+#if CASE == 2
     double offset(double) const
     {
         return 0.2;
@@ -89,6 +83,7 @@ struct Block {
 /// A system that declares bounds of its guard, for `Planned`.
 struct Beside {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
     static void flow(double, const State& x, State& dxdt) { dxdt = {x[1], -x[0]}; }
     static double guard(double, const State& x) { return x[1]; }
     static double speed_bound(double, const State&) { return 1; }

@@ -142,6 +142,7 @@ struct Relays {
 template <class Set>
 struct Hybrid {
     using State = std::array<double, 6>;
+    static constexpr bool resets = false;
     static constexpr std::size_t guard_count = Set::reaction_size;
     Set set;
 

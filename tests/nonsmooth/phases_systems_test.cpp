@@ -94,6 +94,7 @@ TEST(PhasesSystems, TwoBlocksStickInOneSet)
 /// x'' = -Sgn x, a relay that acts two integrations away: state (x, x').
 struct Relay {
     using State = Two;
+    static constexpr bool resets = false;
     struct Motion {
         static constexpr int state_size = 2, reaction_size = 1;
         static void smooth(double, const Eigen::Vector2d& w, Eigen::Vector2d& f) { f << w[1], 0; }

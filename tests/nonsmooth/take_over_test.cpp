@@ -21,6 +21,7 @@ namespace {
 /// sign of the sliding velocity is a guard, and the flow uses it.
 struct Belt {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
     FrictionInclusion inclusion;
     static constexpr Crossing crossing = Crossing::either;
 
@@ -197,6 +198,7 @@ struct LoadedInclusion {
 /// The same with a recorded guard, whose crossings do not cut steps.
 struct LoadedBelt {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
     LoadedInclusion inclusion;
     static constexpr Crossing crossing = Crossing::either;
 
@@ -249,6 +251,7 @@ TEST(TakeOver, SwitchingWithinTheErrorOfStepsIsHandedOver)
 /// after 8 s throws it.
 struct Thrown {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
     struct Friction {
         static constexpr int state_size = 2;
         static constexpr int reaction_size = 1;
@@ -300,6 +303,7 @@ TEST(TakeOver, TimeEventsHappenUnderTheInclusion)
 /// A mass that a load pulls beyond its friction every few seconds, kicked every `interval`.
 struct Kicked {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
     struct Friction {
         static constexpr int state_size = 2;
         static constexpr int reaction_size = 1;

@@ -51,6 +51,14 @@ class House(unittest.TestCase):
         self.assertFalse(self.house.is_closed("scene", "src/base/require.hpp", "base"))
         self.assertEqual(self.figures["private"], [])
 
+    def test_no_type_of_users_is_in_a_folder_detail(self):
+        found = self.house.public_in_detail
+        inside = "namespace ricochet {\nnamespace detail {\nstruct A {\n};\n}  // namespace detail\n"
+        self.assertEqual(found(inside + "}  // namespace ricochet\n"), [])
+        self.assertEqual(found(inside + "class RICOCHET_ALIGNED B {\n};\nstruct C;\nenum class D { e };\n}  // namespace ricochet\n"),
+                         ["B", "D"])
+        self.assertEqual(self.figures["public_in_detail"], [])
+
     def test_every_door_is_used(self):
         files = self.house.tracked()
         uses = {(to, name.split("/")[1]) for name in files if name.startswith("src/")

@@ -22,6 +22,7 @@ using namespace test;
 /// An oscillator with a guard that records upward passages of `level`.
 struct Section {
     using State = X2;
+    static constexpr bool resets = false;
     double level = 0.5;
     bool only_sign = false;
     static constexpr std::size_t guard_count = 1;

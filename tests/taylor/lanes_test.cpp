@@ -25,6 +25,7 @@ using Series = ErrorControlled<Taylor>;
 /// Hénon and Heiles' motion, with its section x = 0 in one direction.
 struct HenonHeiles {
     using State = Four;
+    static constexpr bool resets = false;
     static constexpr Crossing crossing = Crossing::rising;
     template <class S>
     constexpr void flow(const S& /*t*/, const std::array<S, 4>& x, std::array<S, 4>& dxdt) const

@@ -63,6 +63,7 @@ TEST(LazySeries, RunsAreThoseOfTheUnrolledSeriesToTheRoundingOfTheTime)
 /// A pendulum whose damping is omitted where it is zero, with a function that is not constexpr.
 struct Damped {
     using State = Two;
+    static constexpr bool resets = false;
     double damping = 0;
 
     template <class S>
@@ -135,6 +136,7 @@ TEST(LazySeries, FlowsOfMoreOperationsThanAreCompiledAgreeWithFehlberg78)
 /// Oscillators in a row, beside each other, as many as there are frequencies.
 struct Row {
     using State = Vector;
+    static constexpr bool resets = false;
     static constexpr Crossing crossing = Crossing::falling;
     Vector frequencies;
 
@@ -387,6 +389,7 @@ TEST(LazySeries, PolynomialsInTimeAreKnownAsSuch)
 /// As many guards as walls.
 struct Walled {
     using State = Vector;
+    static constexpr bool resets = false;
     Vector walls;
     [[nodiscard]] std::size_t guard_count() const { return walls.size(); }
     template <class S>

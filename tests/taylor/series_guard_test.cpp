@@ -102,6 +102,7 @@ TEST(SeriesGuard, ARootAtTheStartIsDividedOut)
 /// A rotation, and a wall that its first component exceeds by `depth`.
 struct Grazing {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
     static constexpr Crossing crossing = Crossing::either;
     double depth = 0;
     template <class S>

@@ -175,6 +175,7 @@ TEST(Taylor, EveryImpactOfAForcedOscillatorIsFoundToTheRoundingOfItsTime)
 
 struct Pendulum {
     using State = Two;
+    static constexpr bool resets = false;
     double ratio = 1;  ///< g / l [1/s²]
     template <class S>
     constexpr void flow(const S& /*t*/, const std::array<S, 2>& x, std::array<S, 2>& dxdt) const
@@ -389,6 +390,7 @@ TEST(Taylor, TimeEventsInterruptTheSteps)
 
 /// Six oscillators of different frequencies: more components than the loop keeps in registers.
 struct Six {
+    static constexpr bool resets = false;
     static constexpr std::size_t n = 12;
     using State = std::array<double, n>;
     template <class S>
@@ -533,6 +535,7 @@ TEST(Taylor, WhatCannotBeExpandedIsRefusedBeforeTheRun)
 /// e^t meets 2, 3, ...: as many levels as the object says.
 struct Levels {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
     std::size_t levels = 2;
 
     [[nodiscard]] std::size_t guard_count() const { return levels; }

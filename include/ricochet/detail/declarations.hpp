@@ -74,35 +74,6 @@ template <class System>
 struct NamesTwice<System, true> : Names {
 };
 
-/// The same for names that are likely misspellings.
-struct NearNames {
-#define RICOCHET_FUNCTION(wrong, right) int wrong;
-#define RICOCHET_VALUE(wrong, right) int wrong;
-#include "ricochet/detail/misspellings.inc"
-#undef RICOCHET_FUNCTION
-#undef RICOCHET_VALUE
-};
-
-template <class System, bool final = std::is_final_v<System>>
-struct NearNamesTwice : System, NearNames {
-};
-
-template <class System>
-struct NearNamesTwice<System, true> : NearNames {
-};
-
-/// None of those names is in use.
-/// @tparam Twice  `NearNamesTwice` of a system
-template <class Twice>
-concept SpeltWell = requires
-{
-#define RICOCHET_FUNCTION(wrong, right) &Twice::wrong;
-#define RICOCHET_VALUE(wrong, right) &Twice::wrong;
-#include "ricochet/detail/misspellings.inc"
-#undef RICOCHET_FUNCTION
-#undef RICOCHET_VALUE
-};
-
 // Tests of one name: whether a class has a member of it, how it can be
 // called, whether it has an address, whether it is a number or another value.
 #define RICOCHET_NAME(name)                                                                 \
@@ -548,32 +519,11 @@ template <class System, class X>
     return value_declaration<Name_unilateral, System, fits>();
 }
 
-/// Of a data member.
-template <class T>
-concept NotCalled = !std::is_function_v<std::remove_reference_t<T>>;
-
-/// Refuses names that are likely misspellings, with a sentence for each. A data member or a
-/// nested type whose name is near to that of a function has its own purpose.
-template <class System, class Twice = NearNamesTwice<System>>
-struct NearNamesOf {
-    static const System& system;
-#define RICOCHET_FUNCTION(wrong, right)                                                     \
-    static_assert(                                                                          \
-        requires { &Twice::wrong; } || requires { typename System::wrong; } ||              \
-            requires { requires NotCalled<decltype((system.wrong))>; },                     \
-        "ricochet: found a member `" #wrong "`, which nothing calls; rename it to `" #right \
-        "`, or declare "                                                                    \
-        "static constexpr bool unchecked_names = true if it is meant");
-#define RICOCHET_VALUE(wrong, right)                                                        \
-    static_assert(                                                                          \
-        requires { &Twice::wrong; } || requires { typename System::wrong; },                \
-        "ricochet: found a member `" #wrong "`, which nothing reads; rename it to `" #right \
-        "`, or declare "                                                                    \
-        "static constexpr bool unchecked_names = true if it is meant");
-#include "ricochet/detail/misspellings.inc"
-#undef RICOCHET_FUNCTION
-#undef RICOCHET_VALUE
-    static constexpr bool checked = true;
+/// The system says that its events change nothing: they are recorded, or end the run.
+template <class System>
+concept SaysNoReset = requires
+{
+    requires !System::resets;
 };
 
 /// Rejects a system with set_valued() where its inclusion would be ignored.
@@ -598,8 +548,6 @@ constexpr bool check_declarations()
     {
         requires System::unchecked_names;
     };
-    if constexpr (checks_names && !SpeltWell<NearNamesTwice<System>>)
-        static_assert(NearNamesOf<System>::checked);
 #define RICOCHET_CHECK(name, expected)                                                        \
     {                                                                                         \
         constexpr Declaration found = name##_declaration<System, X>();                        \
@@ -681,6 +629,13 @@ constexpr bool check_declarations()
                    "void time_reset(double t, State& x) const, or Mode time_reset(Mode, double t, "
                    "State& x) const, with a next_time_event or Times time_events")
 #undef RICOCHET_CHECK
+    constexpr bool has_reset = reset_declaration<System, X>() != Declaration::absent ||
+                               is_hidden<Name_reset, System, X>();
+    static_assert(!checks_names || !Guarded<System, X> || has_reset || SaysNoReset<System>,
+                  "ricochet: found a guard and no reset; expected a reset of that name or, where "
+                  "events are only recorded or end the run, static constexpr bool resets = false");
+    static_assert(!has_reset || !SaysNoReset<System>,
+                  "ricochet: found a reset beside resets = false; expected one of the two");
     if constexpr (CountsGuards<System>) {
         static_assert(Guarded<System, X>,
                       "ricochet: found guard_count, but neither guard(which, [mode,] t, x) nor "
@@ -745,8 +700,7 @@ constexpr bool check_system()
                       "the flow takes");
     } else {
         static_assert(check_declarations<System, X>());
-        static_assert(!SpeltWell<NearNamesTwice<System>> ||
-                          flow_declaration<System, X>() != Declaration::absent,
+        static_assert(flow_declaration<System, X>() != Declaration::absent,
                       "ricochet: found no flow that fits the state; expected void flow([Mode,] "
                       "double t, const State& x, State& dxdt) const");
     }

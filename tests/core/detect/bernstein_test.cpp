@@ -52,6 +52,7 @@ bool all_of_kind(const Run<State>& run, EventKind kind)
 /// A guard of time alone, beside x' = 1 from x = t.
 struct Timed {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
 
     std::function<double(double)> function;
     Crossing crossing = Crossing::either;
@@ -284,6 +285,7 @@ TEST(Bernstein, HowNearIsATouchIsTheSystemsToSay)
 /// sin t to a power, from the state or from the time.
 struct SinePower {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
 
     int power = 2;
     bool from_state = true;

@@ -185,6 +185,7 @@ TEST(Network, AModelForAnotherSystemIsRefused)
 
     struct Nameless {
         using State = std::array<double, 2>;
+        static constexpr bool resets = false;
         void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -x[0]}; }
         [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
     };

@@ -441,6 +441,7 @@ TEST(Planned, GuardsThatComeTogetherHaveTheEventsOfTheExactDetector)
 /// A point that circles an origin at the speed `rate`, and a wall that it never reaches.
 struct Far {
     using State = X;
+    static constexpr bool resets = false;
     double rate = 2;
     double distance = 5;  ///< of the wall from the origin
     bool tabulated = false;
@@ -474,6 +475,7 @@ TEST(Planned, LookingAheadSavesChecks)
     // When the point moves away from a wall at the full speed, two values cover any interval; one
     // covers a distance equal to that to the wall, which takes log2(1000) checks from 0.01 to 10.
     struct Leaving {
+        static constexpr bool resets = false;
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0, 0, 0}; }
         double guard(double, const X& x) const { return x[0]; }
         double speed_bound(double, const X&) const { return 1; }
@@ -643,6 +645,7 @@ TEST(Planned, AWrongLowerBoundIsNamed)
 /// x0 oscillates; the guard is armed below its surface at the start.
 struct Outside {
     using State = X;
+    static constexpr bool resets = false;
     double above = 0;  ///< added to the guard in its claimed upper bound
 
     static constexpr GuardInfo guard_info(std::size_t)
@@ -1132,6 +1135,7 @@ TEST(Planned, ATimeEventAtTheEndAccusesNoBound)
 {
     // Its reset moves the guard by more than the bound of the flow allows.
     struct Moved {
+        static constexpr bool resets = false;
         void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], 0, 0, 0}; }
         double guard(double, const X& x) const { return x[0]; }
         double speed_bound(double, const X&) const { return 1; }

@@ -39,6 +39,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// The state is the time.
 struct Clock {
     using State = X;
+    static constexpr bool resets = false;
     struct Guard {
         std::function<double(double)> value;
         double speed = 0;         ///< [1/s]

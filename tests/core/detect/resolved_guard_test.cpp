@@ -305,6 +305,7 @@ TEST(ResolvedGuards, AFlowThatEndsAtItsSurfaceHasItsEventThere)
 
 /// The flow is not a number beyond x = 1, where there is no guard.
 struct Nowhere {
+    static constexpr bool resets = false;
     void flow(double, const X1& x, X1& dxdt) const { dxdt = {1 + std::sqrt(1 - x[0])}; }
     [[nodiscard]] double guard(double, const X1& x) const { return 3 - x[0]; }
 };

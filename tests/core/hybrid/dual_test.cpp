@@ -119,6 +119,7 @@ TEST(Dual, DualsOfDualsHaveSecondDerivatives)
 
 struct Plain {
     using State = X;
+    static constexpr bool resets = false;
     template <class V>
     void flow(double, const V& x, V& dxdt) const
     {
@@ -141,6 +142,7 @@ struct Plain {
 /// Takes any argument, but is no template over one scalar: it calls functions of doubles.
 struct Careless {
     using State = X;
+    static constexpr bool resets = false;
     void flow(auto, const auto& x, auto& dxdt) const
     {
         dxdt[0] = x[1];
@@ -301,6 +303,7 @@ TEST(Degree, OfTheReadySystems)
 /// Guard number `which` is a polynomial of degree `degrees[which]`, or none for 0.
 struct Polynomials {
     using State = X;
+    static constexpr bool resets = false;
     static constexpr std::size_t guard_count = 10;
     static constexpr std::array<int, guard_count> degrees{3, 4, 2, 1, 0, 0, 0, 0, 0, 5};
     template <class S>

@@ -31,6 +31,7 @@ using X3 = std::array<double, 3>;
 
 /// Falls to zero at t = 1 and stays there, until t = 2 or forever.
 struct Arriving {
+    static constexpr bool resets = false;
     double leaves = std::numeric_limits<double>::infinity();
     void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
     [[nodiscard]] double guard(double, const X1& x) const
@@ -238,6 +239,7 @@ TEST(HardEvents, AStartOnATouchIsNoEvent)
 
 /// (x - 1/2)^2 with a time event at the touch.
 struct TouchOnTime {
+    static constexpr bool resets = false;
     Crossing crossing = Crossing::either;
     void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
     [[nodiscard]] double guard(double, const X1& x) const { return (x[0] - 0.5) * (x[0] - 0.5); }
@@ -581,6 +583,7 @@ TEST(HardEvents, APredicateHoldsForGuardsThatAResetFlips)
 TEST(HardEvents, AGuardThatIsNoNumberEndsTheRunOnAPlateauToo)
 {
     struct Broken {
+        static constexpr bool resets = false;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const
         {
@@ -593,6 +596,7 @@ TEST(HardEvents, AGuardThatIsNoNumberEndsTheRunOnAPlateauToo)
 TEST(HardEvents, AGuardThatBecomesInfiniteHasNoEventThere)
 {
     struct Broken {
+        static constexpr bool resets = false;
         double beyond;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const { return x[0] < 1.5 ? 1.2 : beyond; }
@@ -638,6 +642,7 @@ TEST(HardEvents, ASpoiltSnapshotIsRefusedAndChangesNothing)
 TEST(HardEvents, AdvanceStopsAtSamplesAndShowsTheLastEvent)
 {
     struct Clock {
+        static constexpr bool resets = false;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const { return 1.2 - x[0]; }
     };
@@ -823,6 +828,7 @@ TEST(HardEvents, AStartThatTellsNoTimeScaleDoesNotTakeItFromTheEnd)
 {
     // At rest at the origin, under a force that grows with the time: x = t^3 / 6 meets 1.
     struct Pushed {
+        static constexpr bool resets = false;
         void flow(double t, const X& x, X& dxdt) const { dxdt = {x[1], t}; }
         [[nodiscard]] double guard(double, const X& x) const { return 1 - x[0]; }
     };
@@ -840,6 +846,7 @@ TEST(HardEvents, AStartThatTellsNoTimeScaleDoesNotTakeItFromTheEnd)
 /// A crest one unit in the last place high, where the guard is zero at a great many offsets; its
 /// declared rate falls there, like that of a flow that jumps at the surface.
 struct RoundedCrest {
+    static constexpr bool resets = false;
     static constexpr Crossing crossing = Crossing::either;
     void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
     [[nodiscard]] double guard(double, const X& x) const { return x[0] - 1; }
@@ -862,6 +869,7 @@ TEST(HardEvents, ARateThatContradictsASurfaceOfRoundingIsNotFollowedForEver)
 /// Two roots close to each other, passed at unit speed.
 struct CloseRoots {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
     void flow(double, const State&, State& dxdt) const { dxdt[0] = 1; }
     [[nodiscard]] double guard(double, const State& x) const
     {
@@ -883,6 +891,7 @@ TEST(HardEvents, TomsFindsEachOfTwoCloseRootsOnce)
 /// Two roots, the first of which lies at the end of a step to half a unit in the last place.
 struct RootAtAnEnd {
     using State = X1;
+    static constexpr bool resets = false;
     double first = 0;
     double second = 0;
     void flow(double, const X1&, X1& dxdt) const { dxdt[0] = 1; }
@@ -1027,6 +1036,7 @@ TEST(HardEvents, AnEventThatChangesNothingIsFoundOnceWhereTheStepDiffersFromItsP
 /// A clock beside a motion that makes its steps irregular.
 struct Alarm {
     using State = X1;
+    static constexpr bool resets = false;
     double at = 0;
     void flow(double t, const X1&, X1& dxdt) const { dxdt[0] = std::cos(t); }
     [[nodiscard]] double guard(double t, const X1&) const { return t - at; }
@@ -1073,6 +1083,7 @@ TEST(HardEvents, ASampleAtTheTimeOfAnEventShowsTheStateAfterIt)
 /// A state that does not move, and a cubic of the time, with roots at 1, 1.25 and 60.
 struct Timetable {
     using State = X1;
+    static constexpr bool resets = false;
     static void flow(double, const X1&, X1& dxdt) { dxdt = {0}; }
     [[nodiscard]] static double guard(double t, const X1& x)
     {

@@ -60,6 +60,7 @@ bool same_bits(const ricochet::Run<State>& a, const ricochet::Run<State>& b)
 /// other integrators step across (scipy issue 9228).
 struct HiddenPair {
     using State = X1;
+    static constexpr bool resets = false;
     Crossing crossing = Crossing::either;
     void flow(double t, const X1&, X1& dxdt) const { dxdt = {3 * t * t + 12 * t - 4}; }
     [[nodiscard]] double guard(double, const X1& x) const { return x[0]; }
@@ -87,6 +88,7 @@ TEST(Events, AHiddenPairIsFoundInOneGiantStep)
 /// y = cos(t + p); guard y - (1 - depth).
 struct NearTangent {
     using State = X;
+    static constexpr bool resets = false;
     double depth;
     Crossing crossing = Crossing::either;
     void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -x[0]}; }
@@ -167,6 +169,7 @@ TEST(Events, ATouchIsReportedOnceWhereverTheStepsFall)
     // g = (t - 1/2)^2 is zero with zero rate at 1/2, which lies inside a step, at the
     // end of one, and a rounding away from it.
     struct Squared {
+        static constexpr bool resets = false;
         Crossing crossing = Crossing::either;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const
@@ -221,6 +224,7 @@ TEST(Events, ADeclaredBandTurnsDipsOfLessThanItIntoTouches)
 TEST(Events, ATripleRootIsOneCrossing)
 {
     struct Cubed {
+        static constexpr bool resets = false;
         Crossing crossing = Crossing::either;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const
@@ -573,6 +577,7 @@ TEST(Events, APlateauWaits)
 {
     // g = max(0, 1 - t) - max(0, t - 2): down to zero at 1, away below at 2.
     struct Plateau {
+        static constexpr bool resets = false;
         Crossing crossing = Crossing::either;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const
@@ -1039,6 +1044,7 @@ TEST(Events, ContradictoryDeclarationsAreRefused)
     };
     EXPECT_THROW((void)integrate(Rising{}, X{1, 0}, {.t_end = 1}), std::invalid_argument);
     struct NoReset {
+        static constexpr bool resets = false;
         bool unilateral = true;
         void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
         [[nodiscard]] double guard(double, const X& x) const { return x[0]; }

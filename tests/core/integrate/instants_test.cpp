@@ -148,6 +148,7 @@ TEST(Instants, TiesAtOtherScalesAndOffsetsAreNotPartedByRounding)
 /// The same clock with its guard recorded only: x' = 1, ticks set it back.
 struct RecordedClock {
     using State = One;
+    static constexpr bool resets = false;
     double period = 1;
     void flow(double /*t*/, const State& /*x*/, State& dxdt) const { dxdt[0] = 1; }
     [[nodiscard]] double guard(double /*t*/, const State& x) const { return period - x[0]; }
@@ -484,6 +485,7 @@ TEST(Instants, NothingIsCalledOutsideOfTheRun)
 /// A guard with a rate that is a difference, which touches its surface at the end.
 struct EndTouch {
     using State = One;
+    static constexpr bool resets = false;
     mutable double latest = 0;
     void flow(double t, const State& /*x*/, State& dxdt) const
     {

@@ -290,6 +290,7 @@ TEST(Integrate, AnEmptyIntervalReturnsTheStart)
 /// x' = 1: a clock whose guard is a function of time alone, with no rate declared.
 struct Chime {
     using State = X;
+    static constexpr bool resets = false;
     double at = 0.7;
     Crossing crossing = Crossing::rising;
     void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
@@ -410,6 +411,7 @@ TEST(Integrate, AccumulatingImpactsEndInRest)
 /// Falls freely; the flow fails from t = 1 on.
 struct Failing {
     using State = X;
+    static constexpr bool resets = false;
     void flow(double t, const X& x, X& dxdt) const { dxdt = {x[1], t < 1 ? -1.0 : nan}; }
     [[nodiscard]] double guard(double, const X& x) const { return x[0] - 9.9; }
 };
@@ -481,6 +483,7 @@ TEST(Integrate, AGuardThatFailsEndsTheRun)
 {
     struct Blind {
         using State = X;
+        static constexpr bool resets = false;
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
         [[nodiscard]] double guard(double t, const X&) const { return t < 0.5 ? 1.0 : nan; }
     };
@@ -523,6 +526,7 @@ TEST(Integrate, AResetBehindTheSurfaceIsReported)
 TEST(Integrate, APoleIsOneEventNotAThousand)
 {
     struct Pole {
+        static constexpr bool resets = false;
         Crossing crossing = Crossing::either;
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
         [[nodiscard]] double guard(double t, const X&) const { return std::tan(t); }
@@ -538,6 +542,7 @@ TEST(Integrate, APoleIsOneEventNotAThousand)
 TEST(Integrate, EventsThatDoNotAdvanceTimeEndTheRun)
 {
     struct Plateau {
+        static constexpr bool resets = false;
         Crossing crossing = Crossing::either;
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
         [[nodiscard]] double guard(double t, const X&) const
@@ -630,6 +635,7 @@ TEST(Integrate, AStartWithoutComponentsIsRefused)
 TEST(Integrate, AConstraintWithoutAResetIsRefused)
 {
     struct Wall {
+        static constexpr bool resets = false;
         bool unilateral = true;
         void flow(double, const X&, X& dxdt) const { dxdt = {-1, 0}; }
         [[nodiscard]] double guard(double, const X& x) const { return x[0]; }

@@ -159,6 +159,7 @@ TEST(ManyGuards, OneThatAResetCarriesAcrossFiresAtTheSameInstant)
 /// x' = 1; waves, of which each is a guard that no reset depends on.
 struct Waves {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
     std::vector<std::array<double, 3>> waves;  ///< frequency, phase and level of each
 
     [[nodiscard]] std::size_t guard_count() const { return waves.size(); }

@@ -314,6 +314,7 @@ TEST(Monitor, AGuardThatArrivesAndStaysHasOneEvent)
 
 /// A parabola that dips below its surface by `depth` [m], around t = 1.
 struct Dip {
+    static constexpr bool resets = false;
     double depth = 0;
     void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], 2}; }
     [[nodiscard]] double guard(double, const X& x) const { return x[0]; }
@@ -654,6 +655,7 @@ TEST(Monitor, AHostMayRunBackward)
 {
     // x = t^2 - 1, from t = 2 down: above its surface until t = 1, and again from t = -1 on.
     struct Parabola {
+        static constexpr bool resets = false;
         void flow(double t, const X1&, X1& dxdt) const { dxdt = {2 * t}; }
         [[nodiscard]] double guard(double, const X1& x) const { return x[0]; }
     };
@@ -855,6 +857,7 @@ TEST(Monitor, ASnapshotGoesOnWithTheSameBits)
 /// A fall that ends the run at the floor.
 struct LastFall {
     using State = X;
+    static constexpr bool resets = false;
     void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
     double guard(double, const X& x) const { return x[0]; }
     GuardInfo guard_info() const { return {.stop_after = 1}; }
@@ -1103,6 +1106,7 @@ TEST(MonitorRefusals, StartsAndArraysThatAreNone)
 TEST(MonitorRefusals, AGuardThatIsNoNumberEndsTheRun)
 {
     struct Root {
+        static constexpr bool resets = false;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {-1}; }
         [[nodiscard]] double guard(double, const X1& x) const { return std::sqrt(x[0]) + 1; }
     };

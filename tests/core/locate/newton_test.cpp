@@ -59,6 +59,7 @@ TEST(Newton, ARootOfHigherOrderCostsAtMostSixtySteps)
 /// A guard of time alone, without a rate, beside x' = 1 from x = 0.
 struct GuardOfTime {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
 
     double (*function)(double);
 

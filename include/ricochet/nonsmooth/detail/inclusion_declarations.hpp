@@ -2,9 +2,8 @@
 //
 // Members of an inclusion that exist but do not fit.
 //
-// Without these checks a member with other parameters, one that is not const, or one whose name
-// is a slip away from a known one would be ignored and the default used. The names and the
-// way to declare that they are intended are those of declarations.hpp.
+// Without these checks a member with other parameters, or one that is not const, would be ignored
+// and the default used. The names are those of declarations.hpp.
 #pragma once
 
 #include <concepts>
@@ -16,59 +15,6 @@
 #include "ricochet/nonsmooth/linear_cases.hpp"
 
 namespace ricochet::detail {
-
-/// Names that are likely misspellings of the names of inclusions.
-struct NearInclusionNames {
-#define RICOCHET_FUNCTION(wrong, right) int wrong;
-#define RICOCHET_VALUE(wrong, right) int wrong;
-#include "ricochet/nonsmooth/detail/inclusion_misspellings.inc"
-#undef RICOCHET_FUNCTION
-#undef RICOCHET_VALUE
-};
-
-template <class System, bool final = std::is_final_v<System>>
-struct NearInclusionNamesTwice : System, NearInclusionNames {
-};
-
-template <class System>
-struct NearInclusionNamesTwice<System, true> : NearInclusionNames {
-};
-
-template <class System>
-concept InclusionSpeltWell = requires
-{
-#define RICOCHET_FUNCTION(wrong, right) &NearInclusionNamesTwice<System>::wrong;
-#define RICOCHET_VALUE(wrong, right) &NearInclusionNamesTwice<System>::wrong;
-#include "ricochet/nonsmooth/detail/inclusion_misspellings.inc"
-#undef RICOCHET_FUNCTION
-#undef RICOCHET_VALUE
-};
-
-/// Refuses each of these with a sentence. Data members and types may have such a name.
-template <class System>
-struct NearInclusionNamesOf {
-#define RICOCHET_FUNCTION(wrong, right)                                                          \
-    static_assert(                                                                               \
-        requires { &NearInclusionNamesTwice<System>::wrong; } ||                                 \
-            requires { typename System::wrong; } ||                                              \
-            requires(const System& system) {                                                     \
-                requires !std::is_function_v<std::remove_reference_t<decltype((system.wrong))>>; \
-            },                                                                                   \
-        "ricochet: found a member `" #wrong "`, which nothing calls; rename it to `" #right      \
-        "`, or declare "                                                                         \
-        "static constexpr bool unchecked_names = true if it is meant");
-#define RICOCHET_VALUE(wrong, right)                                                        \
-    static_assert(                                                                          \
-        requires { &NearInclusionNamesTwice<System>::wrong; } ||                            \
-            requires { typename System::wrong; },                                           \
-        "ricochet: found a member `" #wrong "`, which nothing reads; rename it to `" #right \
-        "`, or declare "                                                                    \
-        "static constexpr bool unchecked_names = true if it is meant");
-#include "ricochet/nonsmooth/detail/inclusion_misspellings.inc"
-#undef RICOCHET_FUNCTION
-#undef RICOCHET_VALUE
-    static constexpr bool checked = true;
-};
 
 /// A function that is called with `Arguments`, the last of which it writes if `writes`. A data
 /// member or a type of this name has a purpose of its own.
@@ -145,8 +91,6 @@ constexpr bool check_inclusion()
     {
         typename std::bool_constant<System::affine>;
     };
-    if constexpr (checks_names && !InclusionSpeltWell<System>)
-        static_assert(NearInclusionNamesOf<System>::checked);
 #define RICOCHET_CHECK(name, expected, ...)                                                        \
     {                                                                                              \
         constexpr Declaration found = __VA_ARGS__;                                                 \
