@@ -1,7 +1,12 @@
 // The one-step methods, named as types.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <type_traits>
 
 #include "ricochet/detail/runge_kutta.hpp"
@@ -27,18 +32,21 @@ struct ThisStepper {
 
 /// Euler's method, of order 1.
 struct Euler {
+    static constexpr std::string_view name = "euler";
     template <class State>
     using Stepper = detail::RungeKutta<detail::EulerTableau, State>;
 };
 
 /// The classical method of order 4.
 struct Rk4 {
+    static constexpr std::string_view name = "rk4";
     template <class State>
     using Stepper = detail::RungeKutta<detail::Rk4Tableau, State>;
 };
 
 /// Cash and Karp's method of order 5, with an error estimate of order 4.
 struct CashKarp54 {
+    static constexpr std::string_view name = "cash-karp54";
     template <class State>
     using Stepper = detail::RungeKutta<detail::CashKarp54Tableau, State>;
 };
@@ -46,6 +54,7 @@ struct CashKarp54 {
 /// Dormand and Prince's method of order 5, with an error estimate, an interpolant of order 4 and
 /// the rate at the end of the step at no cost: the default.
 struct Dopri5 {
+    static constexpr std::string_view name = "dopri5";
     template <class State>
     using Stepper = detail::RungeKutta<detail::Dopri5Tableau, State>;
 };
@@ -56,11 +65,13 @@ struct Dopri5 {
 /// of the rates takes its place. Where the rate depends on the state, but very weakly, it is too
 /// small: use Dopri5 there, or bound the step by `Options::h_max`.
 struct Fehlberg78 {
+    static constexpr std::string_view name = "fehlberg78";
     template <class State>
     using Stepper = detail::RungeKutta<detail::Fehlberg78Tableau, State>;
 };
 
-/// The methods that `MethodByName` can select.
+/// The methods that `MethodByName` can select. Their values are part of the binary interface: a new
+/// one comes last, here and in `detail::NamedMethods`.
 enum class MethodName : std::uint8_t { euler, rk4, cash_karp54, dopri5, fehlberg78 };
 
 /// A method selected at run time, with the same bits: for programs that offer all of them. The flow
@@ -122,31 +133,51 @@ inline constexpr bool has_interpolant = requires(const Stepper& stepper, X& x)
 template <Departing Stepper, class X>
 inline constexpr bool has_interpolant<Stepper, X> = Stepper::has_dense_output;
 
+template <class... Methods>
+struct MethodList {
+    static constexpr std::size_t size = sizeof...(Methods);
+
+    /// The place of a method; `size` if it is not in the list.
+    template <class Method>
+    [[nodiscard]] static constexpr std::size_t place() noexcept
+    {
+        std::size_t place = 0;
+        (void)((std::is_same_v<Method, Methods> || (++place, false)) || ...);
+        return place;
+    }
+
+    /// An array of what `make.operator()<Method>()` returns.
+    template <class Make>
+    [[nodiscard]] static constexpr auto each(const Make& make)
+    {
+        return std::array{make.template operator()<Methods>()...};
+    }
+};
+
+/// The methods of `MethodName`, in its order. Every table of methods is made from this list.
+using NamedMethods = MethodList<Euler, Rk4, CashKarp54, Dopri5, Fehlberg78>;
+
 /// One of the library's own methods, which is also compiled in the library.
 template <class Method>
 struct NameOf {
-    static constexpr bool known = false;
+    static constexpr bool known = NamedMethods::place<Method>() < NamedMethods::size;
+    static constexpr auto name = static_cast<MethodName>(NamedMethods::place<Method>());
 };
-template <MethodName value>
-struct KnownName {
-    static constexpr bool known = true;
-    static constexpr MethodName name = value;
+
+/// What is known of a method without its type.
+struct NamedMethod {
+    MethodName name;
+    std::string_view spelled;
+    bool estimates_error;
 };
-template <>
-struct NameOf<Euler> : KnownName<MethodName::euler> {
-};
-template <>
-struct NameOf<Rk4> : KnownName<MethodName::rk4> {
-};
-template <>
-struct NameOf<CashKarp54> : KnownName<MethodName::cash_karp54> {
-};
-template <>
-struct NameOf<Dopri5> : KnownName<MethodName::dopri5> {
-};
-template <>
-struct NameOf<Fehlberg78> : KnownName<MethodName::fehlberg78> {
-};
+inline constexpr auto named_methods = NamedMethods::each([]<class Method>() {
+    return NamedMethod{NameOf<Method>::name, Method::name,
+                       Method::template Stepper<std::array<double, 1>>::estimates_error};
+});
+
+/// The names of the methods, of those with error estimates alone or of all, each between two
+/// `quotes`: "a, b or c".
+[[nodiscard]] std::string spelled_methods(bool with_error_estimate, std::string_view quotes = "");
 
 template <class Stepper>
 concept Multistep = requires
@@ -165,5 +196,26 @@ template <class Stepper>
 }
 
 }  // namespace detail
+
+/// As programs and messages spell it, such as "cash-karp54".
+[[nodiscard]] constexpr std::string_view name(MethodName method) noexcept
+{
+    return detail::named_methods[static_cast<std::size_t>(method)].spelled;
+}
+
+/// Whether steps by this method can be chosen by their error.
+[[nodiscard]] constexpr bool estimates_error(MethodName method) noexcept
+{
+    return detail::named_methods[static_cast<std::size_t>(method)].estimates_error;
+}
+
+/// The method that is spelled so, if there is one.
+[[nodiscard]] constexpr std::optional<MethodName> method_named(std::string_view spelled) noexcept
+{
+    for (const detail::NamedMethod& method : detail::named_methods) {
+        if (method.spelled == spelled) return method.name;
+    }
+    return std::nullopt;
+}
 
 }  // namespace ricochet

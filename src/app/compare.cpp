@@ -73,14 +73,14 @@ public:
     }
 
     void add(DetectorKind detector, bool fixed_step, bool in_table, const OwnModel* model = nullptr,
-             std::optional<StepperKind> with = {})
+             std::optional<Stepper> with = {})
     {
         RunRequest request{.set = set_, .detector = std::string(name(detector))};
-        if (with) request.stepper = std::string(name(*with));
+        if (with) request.stepper = std::string(with->name());
         if (fixed_step) request.step = system_.comparison_step;
         if (model != nullptr) request.model = find_model(*model).string();
         RunSettings settings = resolve(system_, request);
-        const std::string_view stepper = name(settings.stepper);
+        const std::string_view stepper = settings.stepper.name();
         std::string label(name(detector));
         if (model != nullptr) label += fmt::format(" {}", model->kind);
         methods_.push_back({.label = std::move(label),
@@ -117,7 +117,7 @@ std::vector<Method> methods(const SystemEntry& system, const std::vector<std::st
         list.add(DetectorKind::bernstein, fixed, false);
     }
     if (system.series) {
-        list.add(DetectorKind::extremum, false, false, nullptr, StepperKind::taylor);
+        list.add(DetectorKind::extremum, false, false, nullptr, Stepper::taylor());
     }
     return list.take();
 }
@@ -336,7 +336,7 @@ std::string to_json(const SystemEntry& system, const std::vector<double>& exact,
         const RunSettings& settings = method.settings;
         Json row{{"label", method.label},
                  {"detector", name(settings.detector)},
-                 {"stepper", name(settings.stepper)},
+                 {"stepper", settings.stepper.name()},
                  {"step", settings.fixed_step ? Json(settings.options.step) : Json()},
                  {"rtol", settings.fixed_step ? Json() : Json(settings.options.rtol)},
                  {"atol", settings.fixed_step ? Json() : Json(settings.options.atol)},

@@ -185,10 +185,10 @@ void add_run_options(CLI::App& command, RunRequest& run)
     add_text(command, "--model", run.model, "FILE",
              "network to use, by path or name; default: one that suits");
     add_text(command, "--locator", run.locator, "NAME", "newton (default), bisection or toms748");
-    add_text(
-        command, "--stepper,--method", run.stepper, "NAME",
-        "rk4 (default with --step), dopri5 (default without), fehlberg78, cash-karp54, euler or, "
-        "where ricochet systems says so, taylor");
+    add_text(command, "--stepper,--method", run.stepper, "NAME",
+             "rk4 (default with --step), dopri5 (default without), another of " +
+                 ricochet::detail::spelled_methods(false) +
+                 " or, where ricochet systems says so, taylor");
     add_number(command, "--step", run.step, "H", "take fixed steps of H [s]");
     add_text(command, "--integrator", run.integrator, "NAME",
              "of set-valued systems: handover (default), event, bathe or time-stepping");

@@ -206,7 +206,7 @@ std::string to_json(const SystemEntry& system, const RunSettings& settings, cons
              {"parameters", parameters},
              {"detector", name(settings.detector)},
              {"locator", name(settings.locator)},
-             {"stepper", name(settings.stepper)}};
+             {"stepper", settings.stepper.name()}};
     if (settings.fixed_step) {
         out["step"] = settings.options.step;
     } else {

@@ -32,12 +32,6 @@ constexpr Names<DetectorKind, 8> detectors{{{"ends", DetectorKind::ends},
 constexpr Names<LocatorKind, 3> locators{{{"newton", LocatorKind::newton},
                                           {"bisection", LocatorKind::bisection},
                                           {"toms748", LocatorKind::toms748}}};
-constexpr Names<StepperKind, 6> steppers{{{"rk4", StepperKind::rk4},
-                                          {"dopri5", StepperKind::dopri5},
-                                          {"fehlberg78", StepperKind::fehlberg78},
-                                          {"cash-karp54", StepperKind::cash_karp54},
-                                          {"euler", StepperKind::euler},
-                                          {"taylor", StepperKind::taylor}}};
 
 template <class Kind, std::size_t n>
 std::string_view name_in(const Names<Kind, n>& names, Kind kind)
@@ -57,6 +51,16 @@ Kind named(std::string_view what, const Names<Kind, n>& names, std::string_view 
     throw unknown(what, given, known);
 }
 
+Stepper stepper_named(std::string_view given)
+{
+    if (given == Stepper::taylor().name()) return Stepper::taylor();
+    if (const auto method = method_named(given)) return *method;
+    std::vector<std::string_view> known;
+    for (const auto& method : ricochet::detail::named_methods) known.push_back(method.spelled);
+    known.push_back(Stepper::taylor().name());
+    throw unknown("stepper", given, known);
+}
+
 void require_positive(std::string_view option, double value)
 {
     if (!(value > 0)) {
@@ -74,13 +78,13 @@ void require_not_negative(std::string_view option, double value)
 void choose_stepping(const SystemEntry& system, const RunRequest& request, RunSettings& settings)
 {
     settings.fixed_step = request.step.has_value();
-    settings.stepper = settings.fixed_step ? StepperKind::rk4 : StepperKind::dopri5;
-    if (request.stepper) settings.stepper = named("stepper", steppers, *request.stepper);
-    if (settings.stepper == StepperKind::taylor && !system.series) {
+    settings.stepper = settings.fixed_step ? MethodName::rk4 : MethodName::dopri5;
+    if (request.stepper) settings.stepper = stepper_named(*request.stepper);
+    if (settings.stepper.is_taylor() && !system.series) {
         throw BadInput(fmt::format(
             "stepper taylor needs a flow that is one formula for numbers and for power series, "
-            "and that of {} is none; expected dopri5, fehlberg78 or cash-karp54",
-            system.name));
+            "and that of {} is none; expected {}",
+            system.name, ricochet::detail::spelled_methods(true)));
     }
 
     Options& options = settings.options;
@@ -94,12 +98,11 @@ void choose_stepping(const SystemEntry& system, const RunRequest& request, RunSe
         options.step = *request.step;
         return;
     }
-    if (settings.stepper == StepperKind::rk4 || settings.stepper == StepperKind::euler) {
+    if (!settings.stepper.estimates_error()) {
         throw BadInput(
             fmt::format("stepper {} has no error estimate and needs --step; "
-                        "steppers with error control are dopri5, fehlberg78, "
-                        "cash-karp54 and, for some systems, taylor",
-                        app::name(settings.stepper)));
+                        "expected {} or, for some systems, taylor",
+                        settings.stepper.name(), ricochet::detail::spelled_methods(true)));
     }
     options.rtol = request.rtol.value_or(options.rtol);
     options.atol = request.atol.value_or(options.atol);
@@ -243,11 +246,6 @@ std::string_view name(LocatorKind kind) noexcept
 {
     return name_in(locators, kind);
 }
-std::string_view name(StepperKind kind) noexcept
-{
-    return name_in(steppers, kind);
-}
-
 std::vector<double> parameter_values(const SystemEntry& system, const std::vector<std::string>& set)
 {
     std::vector<double> values;
@@ -309,8 +307,8 @@ RunSettings resolve(const SystemEntry& system, const RunRequest& request)
 std::string describe_stepping(const RunSettings& settings)
 {
     const Options& options = settings.options;
-    return settings.fixed_step ? fmt::format("{}, step {} s", name(settings.stepper), options.step)
-                               : fmt::format("{}, rtol {}, atol {}", name(settings.stepper),
+    return settings.fixed_step ? fmt::format("{}, step {} s", settings.stepper.name(), options.step)
+                               : fmt::format("{}, rtol {}, atol {}", settings.stepper.name(),
                                              options.rtol, options.atol);
 }
 

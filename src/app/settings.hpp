@@ -6,11 +6,13 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "ricochet/gates.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/options.hpp"
 
 namespace ricochet {
@@ -32,12 +34,38 @@ enum class DetectorKind {
     calibrated
 };
 enum class LocatorKind { newton, bisection, toms748 };
-/// The methods of `MethodName`, and Taylor series.
-enum class StepperKind { euler, rk4, cash_karp54, dopri5, fehlberg78, taylor };
+/// A method of `MethodName`, or Taylor series.
+class Stepper {
+public:
+    Stepper(MethodName method) : method_(method) {}
+    [[nodiscard]] static Stepper taylor() { return Stepper(); }
+
+    [[nodiscard]] bool is_taylor() const noexcept { return !method_; }
+    [[nodiscard]] bool estimates_error() const noexcept
+    {
+        return !method_ || ricochet::estimates_error(*method_);
+    }
+    [[nodiscard]] std::string_view name() const noexcept
+    {
+        return method_ ? ricochet::name(*method_) : "taylor";
+    }
+    /// @throws std::logic_error for Taylor series.
+    [[nodiscard]] MethodName method() const
+    {
+        if (!method_) throw std::logic_error("the flow of this system has no series");
+        return *method_;
+    }
+
+    friend bool operator==(const Stepper&, const Stepper&) = default;
+
+private:
+    Stepper() = default;
+
+    std::optional<MethodName> method_;
+};
 
 [[nodiscard]] std::string_view name(DetectorKind kind) noexcept;
 [[nodiscard]] std::string_view name(LocatorKind kind) noexcept;
-[[nodiscard]] std::string_view name(StepperKind kind) noexcept;
 
 /// Integration of a system that is a differential inclusion.
 struct SetValuedSettings {
@@ -54,7 +82,7 @@ struct RunSettings {
     std::vector<double> start{};     ///< in place of the start that the parameters give; empty: not
                                      ///< given
     Options options;
-    StepperKind stepper = StepperKind::dopri5;
+    Stepper stepper = MethodName::dopri5;
     bool fixed_step = false;  ///< else error control
     DetectorKind detector = DetectorKind::extremum;
     LocatorKind locator = LocatorKind::newton;

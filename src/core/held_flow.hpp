@@ -51,9 +51,8 @@ template <class X>
 [[nodiscard]] const StepKernel<X>& kernel_by_pointer(const StepKernel<X>& kernel, std::size_t size)
 {
     if (!kernel.take || named_kernel(&kernel)) return kernel;
-    for (const MethodName name : {MethodName::euler, MethodName::rk4, MethodName::cash_karp54,
-                                  MethodName::dopri5, MethodName::fehlberg78}) {
-        const StepKernel<X>& named = kernel_by_name<X>(name, size);
+    for (const NamedMethod& method : named_methods) {
+        const StepKernel<X>& named = kernel_by_name<X>(method.name, size);
         if (named.order == kernel.order && named.error_order == kernel.error_order &&
             named.interpolates() == kernel.interpolates()) {
             return named;

@@ -13,15 +13,14 @@ namespace {
 
 using Large = std::vector<double>;
 
-/// In the order of `MethodName`.
-[[nodiscard]] const std::array<NamedKernel<Large>, 5>& all_kernels() noexcept
+using Kernels = std::array<NamedKernel<Large>, NamedMethods::size>;
+
+[[nodiscard]] const Kernels& all_kernels() noexcept
 {
-    static const std::array<NamedKernel<Large>, 5> kernels = {
-        {{LargeKernel<EulerTableau>::make()},
-         {LargeKernel<Rk4Tableau>::make()},
-         {LargeKernel<CashKarp54Tableau>::make()},
-         {LargeKernel<Dopri5Tableau>::make()},
-         {LargeKernel<Fehlberg78Tableau>::make()}}};
+    static const Kernels kernels = NamedMethods::each([]<class Method>() {
+        using Tableau = typename Method::template Stepper<Large>::Coefficients;
+        return NamedKernel<Large>{LargeKernel<Tableau>::make()};
+    });
     return kernels;
 }
 

@@ -11,7 +11,7 @@ namespace ricochet::detail {
 
 namespace {
 
-using Kernels = std::array<NamedKernel<SmallState>, 5>;
+using Kernels = std::array<NamedKernel<SmallState>, NamedMethods::size>;
 
 template <std::size_t n, class Method>
 [[nodiscard]] NamedKernel<SmallState> named()
@@ -25,12 +25,10 @@ template <std::size_t n, class Method>
     return named;
 }
 
-/// In the order of `MethodName`.
 template <std::size_t n>
 [[nodiscard]] Kernels all_of_size()
 {
-    return {named<n, Euler>(), named<n, Rk4>(), named<n, CashKarp54>(), named<n, Dopri5>(),
-            named<n, Fehlberg78>()};
+    return NamedMethods::each([]<class Method>() { return named<n, Method>(); });
 }
 
 [[nodiscard]] const std::array<Kernels, SmallState::room>& all_kernels() noexcept

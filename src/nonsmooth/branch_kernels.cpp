@@ -8,11 +8,8 @@ template <int N>
 const StepKernel<SmallState>& branch_kernel(MethodName name) noexcept
 {
     using X = typename FlowInMode<N>::State;
-    // In the order of `MethodName`.
-    static constexpr std::array kernels{
-        KernelOf<FlowInMode<N>, X, Euler>::make(), KernelOf<FlowInMode<N>, X, Rk4>::make(),
-        KernelOf<FlowInMode<N>, X, CashKarp54>::make(), KernelOf<FlowInMode<N>, X, Dopri5>::make(),
-        KernelOf<FlowInMode<N>, X, Fehlberg78>::make()};
+    static constexpr auto kernels = NamedMethods::each(
+        []<class Method>() { return KernelOf<FlowInMode<N>, X, Method>::make(); });
     return kernels[static_cast<std::size_t>(name)];
 }
 

@@ -131,7 +131,7 @@ template <class System, class Vector>
 [[nodiscard]] TimedRun run_contact(const System& system, Vector q, Vector v,
                                    const RunSettings& settings, int repeats)
 {
-    if (settings.stepper == StepperKind::fehlberg78) {
+    if (settings.stepper == MethodName::fehlberg78) {
         throw BadInput("--stepper of this system can only be dopri5");
     }
     for (std::size_t i = 0; i < settings.start.size(); ++i) {

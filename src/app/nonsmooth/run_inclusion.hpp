@@ -182,7 +182,7 @@ template <class... Steppers, class System>
     for (int i = 0; i < repeats; ++i) {
         if (steps) {
             out = run_by_steps(system, from, settings);
-        } else if (settings.stepper == StepperKind::fehlberg78) {
+        } else if (settings.stepper == MethodName::fehlberg78) {
             if constexpr (sizeof...(Steppers) > 0) {
                 out =
                     run_by_hand_over<System, ErrorControlled<Steppers>...>(system, from, settings);

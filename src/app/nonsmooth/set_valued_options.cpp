@@ -113,7 +113,7 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
     if (request.stepper) {
         const std::string stepper = one_of("stepper of a differential inclusion", request.stepper,
                                            {"dopri5", "fehlberg78"});
-        if (stepper == "fehlberg78") settings.stepper = StepperKind::fehlberg78;
+        if (stepper == "fehlberg78") settings.stepper = MethodName::fehlberg78;
     }
     Options& options = settings.options;
     if (!(options.t_end >= options.t_start)) {

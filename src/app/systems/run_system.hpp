@@ -146,19 +146,6 @@ template <class X>
     return out;
 }
 
-[[nodiscard]] inline MethodName method_of(StepperKind stepper)
-{
-    switch (stepper) {
-        case StepperKind::euler: return MethodName::euler;
-        case StepperKind::rk4: return MethodName::rk4;
-        case StepperKind::cash_karp54: return MethodName::cash_karp54;
-        case StepperKind::dopri5: return MethodName::dopri5;
-        case StepperKind::fehlberg78: return MethodName::fehlberg78;
-        case StepperKind::taylor: break;
-    }
-    throw std::logic_error("the flow of this system has no series");
-}
-
 /// Steps of methods that are compiled in the library.
 struct NamedSteps {
     using Method = MethodByName;
@@ -215,11 +202,11 @@ template <class System, class X>
                                   int repeats)
 {
     if constexpr (has_series<System>) {
-        if (settings.stepper == StepperKind::taylor) {
+        if (settings.stepper.is_taylor()) {
             return run_by<SeriesSteps<System, X>>({}, system, x0, settings, repeats);
         }
     }
-    return run_by<NamedSteps>({method_of(settings.stepper)}, system, x0, settings, repeats);
+    return run_by<NamedSteps>({settings.stepper.method()}, system, x0, settings, repeats);
 }
 
 }  // namespace ricochet::app

@@ -142,7 +142,7 @@ RunOptions read_options(const rc_options* given)
             "ricochet/taylor/taylor.hpp");
     }
     run.fixed_step = reader.flag("fixed_step", from.fixed_step);
-    if (!run.fixed_step && (run.method == RC_RK4 || run.method == RC_EULER)) {
+    if (!run.fixed_step && !estimates_error(method_of(run.method))) {
         reader.refuse(
             "method: found RC_RK4 or RC_EULER, which have no error estimate; expected fixed_step = "
             "1 and a step, or RC_DOPRI5, RC_FEHLBERG78 or RC_CASH_KARP54");
@@ -190,13 +190,17 @@ void require_options_of_phases(const RunOptions& options)
     }
 }
 
-MethodName method_of_phases(rc_method method)
+MethodName method_of(rc_method method) noexcept
 {
     switch (method) {
         case RC_FEHLBERG78: return MethodName::fehlberg78;
         case RC_CASH_KARP54: return MethodName::cash_karp54;
-        default: return MethodName::dopri5;
+        case RC_RK4: return MethodName::rk4;
+        case RC_EULER: return MethodName::euler;
+        case RC_DOPRI5:
+        case RC_TAYLOR: break;  // the latter is refused
     }
+    return MethodName::dopri5;
 }
 
 MonitorOptions read_options(const rc_monitor_options* given)

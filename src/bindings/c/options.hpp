@@ -34,8 +34,8 @@ struct MonitorOptions {
 [[nodiscard]] RunOptions read_options(const rc_options* given);
 /// @throws Refusal for an option that no run with set-valued motion has.
 void require_options_of_phases(const RunOptions& options);
-/// The name of a method with error control.
-[[nodiscard]] MethodName method_of_phases(rc_method method);
+/// The method of an option that has been read.
+[[nodiscard]] MethodName method_of(rc_method method) noexcept;
 /// Null: the defaults.
 /// @throws Refusal or std::invalid_argument naming the option.
 [[nodiscard]] MonitorOptions read_options(const rc_monitor_options* given);

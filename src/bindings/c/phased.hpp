@@ -26,7 +26,7 @@ template <class X>
     detail::PhasedSetup<X> setup;
     setup.user = user;
     setup.by_mode = system->callbacks().mode_count > 0;
-    setup.method = method_of_phases(options.method);
+    setup.method = method_of(options.method);
     const detail::BranchPhasesOptions solving = detail::branch_options(options.options);
     for (std::size_t mode = 0; mode < system->mode_count(); ++mode) {
         detail::Owner<detail::BranchPhases> phases;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -129,26 +130,18 @@ private:
         return goes_on;
     }
 
-    template <class Method>
-    static void set_method(detail::RunSetup<X>& setup, std::size_t size, bool fixed_step)
-    {
-        setup.error_controlled = !fixed_step;
-        setup.stepping = fixed_step ? detail::written_type<FixedStep<Method>>()
-                                    : detail::written_type<ErrorControlled<Method>>();
-        setup.kernel = &detail::kernel_by_name<X>(detail::NameOf<Method>::name, size);
-    }
     [[nodiscard]] detail::RunSetup<X> setup_of(std::size_t size, const RunOptions& options) const
     {
+        static const auto steppings = detail::NamedMethods::each([]<class Method>() {
+            return std::array{detail::written_type<ErrorControlled<Method>>(),
+                              detail::written_type<FixedStep<Method>>()};
+        });
         detail::RunSetup<X> setup = callbacks_.setup();
         setup.cancels_by_itself = true;
-        switch (options.method) {
-            case RC_DOPRI5: set_method<Dopri5>(setup, size, options.fixed_step); break;
-            case RC_FEHLBERG78: set_method<Fehlberg78>(setup, size, options.fixed_step); break;
-            case RC_CASH_KARP54: set_method<CashKarp54>(setup, size, options.fixed_step); break;
-            case RC_RK4: set_method<Rk4>(setup, size, options.fixed_step); break;
-            case RC_EULER: set_method<Euler>(setup, size, options.fixed_step); break;
-            case RC_TAYLOR: break;  // refused with the options
-        }
+        const MethodName method = method_of(options.method);
+        setup.error_controlled = !options.fixed_step;
+        setup.stepping = steppings[static_cast<std::size_t>(method)][options.fixed_step ? 1 : 0];
+        setup.kernel = &detail::kernel_by_name<X>(method, size);
         return setup;
     }
 

@@ -18,16 +18,11 @@ namespace ricochet::python {
 
 namespace {
 
-[[nodiscard]] MethodName method_named(const std::string& name)
+[[nodiscard]] MethodName method_of(const std::string& name)
 {
-    if (name == "dopri5") return MethodName::dopri5;
-    if (name == "fehlberg78") return MethodName::fehlberg78;
-    if (name == "cash-karp54") return MethodName::cash_karp54;
-    if (name == "rk4") return MethodName::rk4;
-    if (name == "euler") return MethodName::euler;
-    throw py::value_error("found '" + name +
-                          "', expected 'dopri5', 'fehlberg78', 'taylor', 'cash-karp54', 'rk4' or "
-                          "'euler'");
+    if (const auto method = method_named(name)) return *method;
+    throw py::value_error("found '" + name + "', expected 'taylor', " +
+                          detail::spelled_methods(false, "'"));
 }
 
 [[nodiscard]] std::string_view one_of(const std::string& name,
@@ -96,7 +91,7 @@ void set(Request& request, const py::handle& value)
          [](Request& request, const py::handle& value) {
              const auto name = read_as<std::string>(value);
              request.by_series = name == "taylor";
-             if (!request.by_series) request.method = method_named(name);
+             if (!request.by_series) request.method = method_of(name);
          }},
         {"fixed",
          [](Request& request, const py::handle& value) { request.fixed = read_as<bool>(value); }},
@@ -168,12 +163,11 @@ Request request_from(const py::dict& given)
             throw py::value_error(std::string(name) + ": " + error.what());
         }
     }
-    if (!request.fixed && !request.by_series &&
-        (request.method == MethodName::rk4 || request.method == MethodName::euler)) {
-        throw py::value_error(std::string("method: found '") +
-                              (request.method == MethodName::rk4 ? "rk4" : "euler") +
+    if (!request.fixed && !request.by_series && !estimates_error(request.method)) {
+        throw py::value_error("method: found '" + std::string(name(request.method)) +
                               "', which has no error estimate, expected fixed=True and a step "
-                              "beside it, or 'dopri5', 'fehlberg78' or 'cash-karp54'");
+                              "beside it, or " +
+                              detail::spelled_methods(true, "'"));
     }
     return request;
 }

@@ -83,11 +83,10 @@ RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunDoor& door,
         return;
     }
 #ifdef RICOCHET_WITH_NONSMOOTH
-    if (request.fixed || request.by_series || request.method == MethodName::rk4 ||
-        request.method == MethodName::euler) {
+    if (request.fixed || request.by_series || !estimates_error(request.method)) {
         throw std::invalid_argument(
-            "set_valued: found fixed steps or the method 'taylor' beside it, expected 'dopri5', "
-            "'fehlberg78' or 'cash-karp54' with error control");
+            "set_valued: found fixed steps or the method 'taylor' beside it, expected " +
+            detail::spelled_methods(true, "'") + " with error control");
     }
     const bool checks = request.detector == "extremum" || request.detector == "ends" ||
                         request.detector == "bernstein";

@@ -90,8 +90,9 @@ void throw_flow_does_not_fit(std::string_view who, std::size_t components)
 void throw_no_error_estimate()
 {
     throw std::invalid_argument(
-        "integrate: error control needs a method with an error estimate: cash_karp54, dopri5 or "
-        "fehlberg78, got euler or rk4");
+        fmt::format("integrate: found a method without an error estimate under error control; "
+                    "expected {}, or FixedStep",
+                    spelled_methods(true)));
 }
 
 void throw_forward_only()

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "ricochet/extremum.hpp"
 #include "ricochet/integrate.hpp"
@@ -98,6 +99,51 @@ TEST(Convergence, ErrorFollowsToleranceWithCashKarp)
 TEST(Convergence, ErrorFollowsToleranceWithFehlberg78)
 {
     expect_proportional<Fehlberg78>();
+}
+
+TEST(NamedMethods, AreThoseOfMethodNameInItsOrder)
+{
+    EXPECT_EQ(detail::NameOf<Euler>::name, MethodName::euler);
+    EXPECT_EQ(detail::NameOf<Rk4>::name, MethodName::rk4);
+    EXPECT_EQ(detail::NameOf<CashKarp54>::name, MethodName::cash_karp54);
+    EXPECT_EQ(detail::NameOf<Dopri5>::name, MethodName::dopri5);
+    EXPECT_EQ(detail::NameOf<Fehlberg78>::name, MethodName::fehlberg78);
+    EXPECT_FALSE(detail::NameOf<ThisStepper<int>>::known);
+    for (const auto& method : detail::named_methods) {
+        EXPECT_EQ(method_named(name(method.name)), method.name) << method.spelled;
+    }
+    EXPECT_EQ(method_named("dopri"), std::nullopt);
+    EXPECT_FALSE(estimates_error(MethodName::rk4));
+    EXPECT_TRUE(estimates_error(MethodName::dopri5));
+}
+
+TEST(NamedMethods, AreListedByMessages)
+{
+    EXPECT_EQ(detail::spelled_methods(true), "cash-karp54, dopri5 or fehlberg78");
+    EXPECT_EQ(detail::spelled_methods(false, "'"),
+              "'euler', 'rk4', 'cash-karp54', 'dopri5' or 'fehlberg78'");
+}
+
+/// The kernel of every name is that of its method: the same bits as the method as a type.
+template <class Method>
+void expect_own_kernel()
+{
+    const WalledOscillator oscillator;
+    const Options options{.t_end = 3, .step = 0.01};
+    const auto typed = integrate(oscillator, {1.0, 0.0}, options, FixedStep<Method>{});
+    const auto named = integrate(oscillator, {1.0, 0.0}, options,
+                                 FixedStep<MethodByName>{{detail::NameOf<Method>::name}});
+    EXPECT_EQ(typed.x, named.x) << Method::name;
+    EXPECT_EQ(typed.statistics.flow_calls, named.statistics.flow_calls) << Method::name;
+}
+
+TEST(NamedMethods, HaveTheirOwnKernels)
+{
+    expect_own_kernel<Euler>();
+    expect_own_kernel<Rk4>();
+    expect_own_kernel<CashKarp54>();
+    expect_own_kernel<Dopri5>();
+    expect_own_kernel<Fehlberg78>();
 }
 
 }  // namespace
