@@ -192,7 +192,7 @@ private:
     template <class V, class D>
     [[nodiscard, gnu::always_inline]] double call_rate(double t, const V& x, const D& dxdt) const
     {
-        return call_rate(*system_, at_.which, Along{at_.mode, t, x, dxdt});
+        return detail::call_rate(*system_, at_.which, Along{at_.mode, t, x, dxdt});
     }
 
     /// The rate where the closed form has none. Its evaluations are not counted.
