@@ -66,6 +66,7 @@ public:
     /// too, or a level. 0: none. NaN is never cleared.
     [[nodiscard]] double cleared(const double* features) const noexcept;
 
+    /// Whether the features lie in the box of the model, outside of which nothing is cleared.
     [[nodiscard]] bool in_domain(const double* features) const noexcept
     {
         return classifier_->in_domain(features);
@@ -77,6 +78,7 @@ public:
         bool outside = false;  ///< outside the domain, where nothing is cleared
     };
 
+    /// Computes the features of the state and asks the gate; allocates nothing.
     template <class System, class X>
     [[nodiscard]] Answer ask(const System& system, Mode mode, double t, const X& x) const
     {

@@ -26,6 +26,7 @@ namespace ricochet {
 
 /// How features are computed from (mode, t, x).
 struct GateRecipe {
+    /// The recipes at the head of this file.
     enum class Kind { state, state_rate, state_phase, angles, chain, own };
 
     static constexpr std::size_t most = 64;  ///< features

@@ -13,9 +13,8 @@ namespace ricochet {
 /// @param x0       initial state; its type is the state type of the run
 /// @param options  only `t_end` is required
 /// @param stepping `ErrorControlled<Method>` or `FixedStep<Method>`
-/// @param detector `Extremum`, `Ends`, `Bernstein`, a `BareNetwork`, or a detector that wraps one
-/// of
-///                 the exact ones, such as `Planned` or `Verified`
+/// @param detector `Extremum`, `Ends`, `Bernstein`, a `BareNetwork`, or a detector that
+///                 wraps one of the exact ones, such as `Planned` or `Verified`
 /// @param locator  `Newton`, `Bisection` or `Toms748`
 /// @throws std::invalid_argument for invalid options, start or guards.
 ///         What happens during the run is returned as `Run::outcome`.

@@ -7,6 +7,7 @@ namespace ricochet {
 
 /// How `Metered` decides.
 struct MeterOptions {
+    /// The rule by which `Metered` decides whether to ask its network.
     enum class Decision : std::uint8_t {
         measured,  ///< by costs sampled with a clock
         counted,   ///< by the costs given here, so that the same run always makes the same choices
@@ -38,6 +39,7 @@ struct MeterReading {
     bool pays = false;          ///< asking the network pays
     bool checks = false;        ///< checking every step is cheapest
 
+    /// Fraction of the inferences that cleared something; 0 without inferences.
     [[nodiscard]] double share_cleared() const noexcept
     {
         return asked > 0 ? static_cast<double>(cleared) / static_cast<double>(asked) : 0;

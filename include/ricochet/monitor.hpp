@@ -340,7 +340,8 @@ public:
     }
 
     /// Tells the monitor that the state has been kept until t [s], at most `must_stop_at`. Returns
-    /// a cut at a time event, and before, without guards, where the flow lifts what rests.
+    /// a cut at a time event, and earlier, without guards, where the flow lifts the guard of a
+    /// rest.
     [[nodiscard]] Verdict hold(double t) { return monitor_->hold(t); }
 
     /// The set of events at which the last step was cut.

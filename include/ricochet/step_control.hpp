@@ -64,6 +64,7 @@ struct ErrorRule {
     double smallest = 0.2;
     double largest = 10;
 
+    /// Whether a step with this error, in units of its tolerance, is accepted.
     [[nodiscard]] static constexpr bool accepts(double error) noexcept { return error <= 1; }
 
     /// h_new / h for a finite `error` >= 0.

@@ -29,7 +29,7 @@ public:
 
     [[nodiscard]] const char* what() const noexcept override { return why_.c_str(); }
     [[nodiscard]] const std::string& why() const noexcept { return why_; }
-    /// The mode after the event; without a value that before it.
+    /// The mode after the event; without a value it is the mode before.
     [[nodiscard]] std::optional<Mode> mode() const noexcept { return mode_; }
 
 private:

@@ -147,7 +147,8 @@ protected:
 
     void refuse_bad_guards();
 
-    /// Whether something besides the end time may end the run. Of resets that is not known.
+    /// Whether something besides the end time and the resets may end the run; of resets that is not
+    /// known in advance.
     [[nodiscard]] bool may_end() const noexcept;
 
     /// Puts the guards that fire at the start into the fired set; if the run `begins` there, also
@@ -207,8 +208,9 @@ protected:
     /// Reason for which a time event is asked for.
     enum class After : std::uint8_t { start, restart, set, time_event };
 
-    /// Finds the next time event at the start of the step. One of a timer in the state, or of a
-    /// list, may be due there; any other that does not lie ahead would be lost, with all after it.
+    /// Finds the next time event at the start of the step. An event of a timer in the state, or of
+    /// a list, may be due there. Any other event has to lie ahead: otherwise it would be lost, with
+    /// all that follow it, and the run ends or is refused.
     void find_time_event(After what);
 
     /// Asks a timer in the state, which a set or a rest may have started or cancelled.
@@ -240,7 +242,8 @@ protected:
         bank_.take_bands();
         first_set_ = true;
     }
-    /// The same for a further level of an instant, at which guards have the tolerances of its set.
+    /// Applies a time event, or a change located by the stepper, after other sets of the same
+    /// instant: guards keep their event tolerances.
     void apply_at_start(bool on_time, double taken = 0);
     void apply_time_event(double taken = 0) { apply_without_guards(true, taken); }
 
@@ -268,8 +271,8 @@ protected:
         return is_suspicious(signs || (error_controlled_ && hardly_moves()));
     }
 
-    /// The same, after an evaluation inside the step if there is one. `everywhere`: guards are
-    /// evaluated at several more places, as where the state hardly moves.
+    /// Whether any guard needs a search, after the evaluation inside the step, if there is one.
+    /// `everywhere`: guards are evaluated at several more places, as where the state hardly moves.
     [[nodiscard]] bool is_suspicious(bool everywhere);
 
     /// Guards with power series need no rates until a search asks for them.
@@ -347,7 +350,7 @@ protected:
         run_.statistics.unresolved_steps += search_.unresolved();
     }
 
-    /// The same for a step that holds no event.
+    /// Counts divided steps as `count_refined` does, for a step that holds no event.
     void count_covered() noexcept
     {
         run_.statistics.refined_steps += search_.cover().refined();
@@ -374,7 +377,7 @@ protected:
 
     /// Whether a crossing repeats the last event of the guard in the same direction. If the guard
     /// has not turned back since, it is the same crossing, found again because the reset moved the
-    /// state by a rounding; otherwise it is a new event, and events accumulate. A guard that has
+    /// state by its rounding; otherwise it is a new event, and events accumulate. A guard that has
     /// been on its other side in between repeats nothing, unless the two cannot be told apart.
     [[nodiscard]] bool repeats(std::size_t i, double t) const noexcept
     {
@@ -439,9 +442,9 @@ protected:
     /// stand.
     [[nodiscard]] bool changes_nothing();
 
-    /// Whether a reset that left the state and the mode has changed the flow or a guard, as one
-    /// does that sets a variable outside of the system: at the end of the step, with the same
-    /// arguments, one of them has other bits than before.
+    /// Whether a reset that left the state and the mode alone has changed the flow or a guard, for
+    /// example by a variable outside of the system. It has if one of them, evaluated again at the
+    /// end of the step with the same arguments, has other bits than before.
     [[nodiscard]] bool changed_elsewhere();
 
     /// Whether a reset that has declined, in a system with modes, acts where the guard is strictly
@@ -507,8 +510,8 @@ protected:
     /// @param on_time  with a time event
     void apply(bool located, bool on_time);
 
-    /// Notes what rounding has taken from the components that the resets of the set leave alone,
-    /// bit for bit: it is still due after the event.
+    /// Notes the remainders, which rounding has taken from the state, of the components that the
+    /// resets of the set leave the same bit for bit: they belong to the state after the event, too.
     void note_left_alone(bool located);
     [[gnu::noinline]] void note_lost(const X& before, const X& after, bool located);
 
@@ -596,10 +599,12 @@ protected:
     /// Whether the fired guards prolong a row of events with excursions that are lost in rounding,
     /// by which a cycle of guards accumulates.
     [[nodiscard]] bool prolongs_row();
-    /// The same for guards that fire at the instant of the set before, where rounding hides that
-    /// they would have moved away from their surfaces and back.
+    /// As `prolongs_row`, for guards that fire at the instant of the set before, where rounding
+    /// hides that they would have moved away from their surfaces and back.
     [[nodiscard]] bool prolongs_row_at_once();
     /// Records the excursion of guard i that has just ended, `soon` after the last acting instant.
+    /// True if the excursion is lost in rounding or has fallen to a thousandth; false if not
+    /// `soon`.
     [[nodiscard]] bool falls(std::size_t i, bool soon);
     [[nodiscard]] bool has_excursions(std::size_t i) const noexcept
     {
@@ -614,7 +619,7 @@ protected:
                                            double interval) const noexcept;
 
     /// Uncertainty [s] of a limit that comes from the rounding of the guards of the cycle: those
-    /// with an event in the last two rounds of that length [s].
+    /// with an event in the last two rounds, each of length `round` [s].
     [[nodiscard]] double error_by_rounding(double round);
     /// Another guard of the cycle in which guard i accumulates: the last one before it.
     [[nodiscard]] std::size_t other_of_cycle(std::size_t i);
@@ -707,7 +712,8 @@ protected:
 
     /// Makes the step hold the components of all holds.
     void renew_holds();
-    /// The same after the holds have been put back, with guards that already know it.
+    /// As `renew_holds`, after the holds have been put back together with the guards, which need
+    /// not be enabled again.
     void resume_holds()
     {
         const std::uint8_t changed = changed_holds_;
@@ -730,11 +736,14 @@ protected:
                            [i](const Hold& hold) { return hold.guard == i; });
     }
 
-    /// Lets the components of hold k go free; the record of its accumulation begins again.
+    /// Lets the components of hold k move again. The accumulation of events at its guard is then
+    /// counted from the beginning.
     void release(std::size_t k);
-    /// Lets go what a reset has changed, or everything where the mode has changed.
+    /// Releases the holds of components that a reset has changed, or all holds where the mode has
+    /// changed.
     void release_changed(const X& before, const X& after, bool changes_mode);
-    /// Lets go, with an event, what the flow lifts at the start of the step. False: nothing.
+    /// Releases, with an event, the first hold whose guard the flow lifts at the start of the step.
+    /// False: there is none.
     [[nodiscard]] bool release_lifted();
     void release_here(std::size_t k);
 
@@ -746,7 +755,7 @@ protected:
         double at = infinity;  ///< [s]
         double bend = 0;       ///< deviation from a straight line, as a part of its size
     };
-    /// Where the flow lifts something first.
+    /// Where the flow first lifts the guard of a hold from its surface.
     struct Release {
         std::size_t hold = no_guard;  ///< number of the hold; `no_guard`: nothing is lifted
         double at = 0;                ///< [s] offset
@@ -767,8 +776,9 @@ protected:
     [[nodiscard]] std::size_t guard_left_at(double t, const X& x);
 
     /// Whether nothing moves and nothing will, up to the next time event or the end: all rates are
-    /// zero, and the flow without holds and all guards are at four later times what they are now.
-    /// (Of a host, whose end is not known, only the guards, over a million steps.)
+    /// zero, and the flow without holds and all guards have at four later times the values that
+    /// they have now. (For a host, whose end is not known, only the guards are evaluated, over a
+    /// million steps.)
     [[nodiscard]] bool stands_still();
     [[nodiscard]] bool guards_stand_still(double t);
 
@@ -800,7 +810,7 @@ protected:
     /// Arms guard i at the start of a run, where it may have an event.
     void arm_one_at_start(std::size_t i, bool begins);
 
-    /// Puts guard i into the next set, or records its event if that is all.
+    /// Puts guard i into the next set or, if it is only recorded, records its event.
     /// @param from  the side that it has left
     void have_event(std::size_t i, life::Arming arming, Side from);
 
@@ -819,7 +829,8 @@ protected:
 
     /// Whether guard i has an event recorded at t.
     [[nodiscard]] bool has_event_at(std::size_t i, double t) const;
-    /// Counts guards that were armed beyond their surfaces, and are not there any more, no longer.
+    /// Removes from the count of guards armed beyond their surfaces those that are not there any
+    /// more.
     void forget_armed_beyond();
 
     /// Lists the guards that were armed beyond their surfaces.
@@ -898,7 +909,8 @@ protected:
         const GuardRecord& record = std::as_const(bank_)[i];
         return record.enabled && record.side == Side::plateau && record.awaited == Side::plateau;
     }
-    /// Whether there is such a guard, which the reset of another one may set in motion.
+    /// Whether any guard stands on its surface without a known side; the reset of another guard may
+    /// set it in motion.
     [[nodiscard]] bool any_stands() const noexcept
     {
         if (single || !bank_.any_stands()) return false;
@@ -907,8 +919,8 @@ protected:
         }
         return false;
     }
-    /// Notes that the current set leaves the flow at the start of the step, `taken` [s] after
-    /// that of `left_start_`, if it is known.
+    /// Notes that the current set leaves the flow at the start of the step. The flow in
+    /// `left_start_`, if it is known, is that of `taken` [s] before; 0: it is not known.
     void leave_from_start(double taken)
     {
         assign(left_rate_, step_.rate0());
@@ -947,8 +959,8 @@ protected:
     /// Notes all that has to be known of the mode and the flow before the resets of the set, which
     /// may leave them.
     void note_set();
-    /// Keeps what `note_set` changes besides the guards of the set, and takes it back where the
-    /// resets have changed nothing.
+    /// `keep_suspects` stores what `note_set` changes besides the guards of the set, and
+    /// `put_suspects_back` restores it where the resets have changed nothing.
     void keep_suspects();
     void put_suspects_back();
     /// Notes the guards whose events a time event finds vetoed.
@@ -1061,8 +1073,8 @@ protected:
     bool resting_ = false;  ///< something is held, and nothing moves
     Holds holds_;
     boost::container::small_vector<Rested, 2> rested_;  ///< at this instant
-    /// Number of times that guards still have to be enabled since the holds have changed: once,
-    /// and once more, so that none is newly enabled after that.
+    /// Number of times that all guards are still to be enabled and disabled afresh since the holds
+    /// have changed: once, and once more, after which no guard counts as newly enabled.
     std::uint8_t changed_holds_ = 0;
     bool stops_ = false;
     std::size_t stopper_ = no_guard;  ///< the guard of the set that ends the run

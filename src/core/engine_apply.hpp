@@ -71,7 +71,7 @@ void EventEngine<X, single>::note_lost(const X& before, const X& after, bool loc
 {
     for (std::size_t c = 0; c < static_cast<std::size_t>(before.size()); ++c) {
         const auto i = static_cast<decltype(before.size())>(c);
-        // A zero may have been set.
+        // A component that is zero may have been set to zero.
         if (after[i] != before[i] || after[i] == 0) continue;
         const double lost = located ? search_.lost_at_set(step_, c) : step_.remainder()[i];
         if (lost != 0) left_alone_.emplace_back(c, lost);
@@ -163,7 +163,8 @@ inline bool EventEngine<X, single>::is_due_here(After what)
         if (what == After::time_event && listed_left_ > 0) --listed_left_;
         return listed_left_ > 0;
     }
-    // A timer in the state has been moved on by an event that has happened, also in another run.
+    // A timer that has had its event has been moved on, also by an earlier run: if it is at t, or
+    // within the window before t, its event is still due.
     if (backward_ || !system_->next_time_event_at || timer_idles_) return false;
     const double ahead = step_.until(time_event_);
     return time_event_ == t || (ahead <= 0 && -ahead <= resolution_.window(t));

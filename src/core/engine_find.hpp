@@ -12,7 +12,7 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
 {
     cleared = false;
     if (predicts_ && !holds_.empty()) {
-        asked_ = false;  // a network knows the flow, and not what a rest leaves of it
+        asked_ = false;  // a network predicts the flow, and not what a rest leaves of it
     } else if (predicts_) {
         meter_.review(run_.statistics);
         asked_ = meter_.asks();
@@ -228,7 +228,7 @@ bool EventEngine<X, single>::acts_beyond()
 {
     std::uint64_t& count = run_.statistics.ineffective_resets;
     const auto fired = search_.fired().span();
-    // A reset that is told the direction of its crossing may be meant for one of them.
+    // A reset that is told the direction of its crossing may be meant for one direction alone.
     const auto is_meant = [this](std::size_t i) {
         const GuardInfo& info = bank_[i].info;
         return info.resets && !(system_->tell_direction && info.crossing == Crossing::either);
@@ -262,7 +262,8 @@ template <class X, bool single>
 inline void EventEngine<X, single>::go_on_past_members()
 {
     for (const std::size_t i : search_.fired()) {
-        // A run that starts where this one ends will have it, since the state is left before it.
+        // A crossing that was joined to the end of the run is left to a run that starts there,
+        // whose state lies before it.
         if (!time_event_due_ && search_.was_joined(step_, i)) continue;
         search_.note(i, bank_[i].side, records_states());
         search_.pass(step_, bank_, i, calls());

@@ -1,8 +1,8 @@
 // What a rest holds, and until when.
 //
-// After a rest in the same mode the motion goes on, unless the flow presses on the guard that has
-// come to rest. Then the components whose result in `rest` does not depend on the state stand
-// still, the others flow, and the guard is not looked at. They go free together where the flow
+// After a rest in the same mode the motion goes on. If the flow presses on the guard that has come
+// to rest, the components whose result in `rest` does not depend on the state are held: they stand
+// still, the others flow, and the guard is not examined. They are released together where the flow
 // without the hold lifts the guard, and where a reset or another mode changes one of them.
 #pragma once
 
@@ -51,8 +51,9 @@ bool EventEngine<X, single>::presses(const Rested& rested, Hold& hold)
     const double g = bank_.view(i, mode, calls()).value(step_.time(0), step_.x0());
     if (hold.inward * g > hold.level) return false;
     if (!system_->flow) return hold.inward * departure(i, h_next_) <= 0;
-    // Its first derivative that is not zero decides, which is the one that a short drift shows. The
-    // longer one is to be watched: it stands out from rounding by a factor of a million.
+    // The first derivative that is not zero decides, and a short drift shows its sign. The drift
+    // that is watched afterwards is a longer one, which stands out from rounding by a factor of a
+    // million.
     double first = 0;
     for (double ahead = tolerances::of_difference * h_next_; ahead <= h_next_; ahead *= 16) {
         const double moved =
@@ -127,7 +128,7 @@ bool EventEngine<X, single>::finds_components(Hold& hold)
     std::size_t c = 0;
     for_each_component(x, [&](auto i) {
         const double size = 0x1p-10 * std::fabs(x[i]) + h_next_ * std::fabs(step_.rate0()[i]);
-        // No two alike, so that no sum or difference of them is left alone.
+        // All displacements differ, so that every sum or difference of components changes.
         const double part = 1 + std::fmod(0.618034 * static_cast<double>(++c), 1.0);
         const double shift = (c % 2 == 0 ? -part : part) * (size > 0 ? size : 0x1p-10);
         up[i] += shift;

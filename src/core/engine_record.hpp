@@ -89,11 +89,12 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         const double ulp = epsilon * std::fabs(step_.time(at.s));
         const double rounded = std::fabs(at.value) + std::fabs(at.rate) * ulp;
         const double close = 8 * finest_bracket(at.s, step_.h());
-        if (record.from > at.s + close) {  // what was found behind the set does not come
+        if (record.from > at.s + close) {  // events that were found behind the set do not happen
             if (at.value != 0) bank_.arm(i, side_of(at.value));
             continue;
         }
-        // It has crossed with the set, to no effect: rounding does not take it back.
+        // It has crossed together with the set, without effect: rounding does not take the crossing
+        // back.
         if (record.from > 0 && at.s - record.from <= close) {
             if (!record.info.boolean) record.noted.band = rounded;
             continue;
@@ -103,8 +104,8 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         const bool with_set = may_cross && (search_.crosses_with_set(step_, bank_, i, at) ||
                                             is_rounding_at_set(i, at));
         GuardSample last = at;
-        // Until it crosses, the guard is on the side that it comes from. The time of the set is
-        // rounded to a double.
+        // Until it crosses, a guard that crosses with the set is on the side from which it comes,
+        // whatever its value is: the time of the set is rounded to a double.
         if (with_set) record.noted.band = rounded;
         if (with_set) last.value = -std::copysign(std::numeric_limits<double>::min(), at.rate);
         if (!record.acting) {
@@ -275,7 +276,7 @@ inline void EventEngine<X, single>::assign_state_of(const Note& note, double s, 
     if (note.where.root == s && s == search_.at()) {
         x = search_.before();
     } else if (options_.record_steps && note.state == Note{}.state) {
-        // As the solution has it there.
+        // The state as the recorded solution has it there.
         x = step_.x0();
         const double from = step_.time(0);
         const DenseView<X, false> view(step_.dense(), backward_ ? from - t : t - from);

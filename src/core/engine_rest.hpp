@@ -120,10 +120,12 @@ void EventEngine<X, single>::note_excursions()
         const double size = size_of_excursion(i, slope, interval);
         Excursions& excursions = record.excursions;
         const bool wants = excursions.wants_rounding(size);
-        const bool known = wants || single;  // whose rounding may depend on the mode
+        // The rounding of a single guard may depend on the mode.
+        const bool known = wants || single;
         record.noted.rounding = known ? rounding_of(i, step_.mode(), at.value, x) : stale;
         const double rounding = wants ? record.noted.rounding : excursions.rounding();
-        // A difference over a part of a step says nothing about a slow guard.
+        // A slow guard is differenced over a longer time: over a part of a step it moves by its
+        // rounding.
         if (size > tolerances::of_drift * rounding || system_->rated || !system_->flow) continue;
         X rate = x;
         step_.flow_in(step_.mode(), at.value, x, rate);
@@ -158,8 +160,9 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
         // A crossing so soon after this one would be taken for its repetition.
         const double soon = 2 * std::fabs(rate) * resolution_.window(step_.start().value);
         jump_lost = record.intervals.jump_is_lost(away, std::max(rounding, soon));
-        // A guard farther away than an error of location explains does not fade, rising or not.
-        // Without a location the reset of another guard may carry it across its surface.
+        // A guard farther away than an error of location explains does not fade, whether it rises
+        // or falls. An event without a location may be due to the reset of another guard, which has
+        // carried this one across its surface.
         const double beyond = located_ ? -away - 2 * record.band : -away;
         if (std::max(away, beyond) > tolerances::of_fading * rounding) {
             record.turned = away > 0;
@@ -168,8 +171,8 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
     } else {
         record.intervals.forget_jumps();
     }
-    // Excursions are not lost in rounding where the guard came from far away, as from where a time
-    // event had put it.
+    // Excursions are not lost in rounding where the guard came from far away, for example from
+    // where a time event had put it.
     const bool came_far = low && std::fabs(bank_.g0(i)) > tolerances::of_fading * rounding;
     bool lost = false;
     if (!system_->rated) {
@@ -181,7 +184,8 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
             }
             // A difference of a unit in the last place does not determine the direction.
             lost = std::fabs(rate) * part <= rounding / 8;
-            // It stands still where its reset has put it, to second order.
+            // The guard stays where its reset has put it: its rate is lost in rounding, and remains
+            // so a short time later.
             if (lost && came_far && !jump_lost &&
                 std::fabs(rate_ahead(i, part, tolerances::per_difference * part)) * part <=
                     rounding / 8) {

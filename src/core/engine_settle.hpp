@@ -101,8 +101,8 @@ inline std::size_t EventEngine<X, single>::endless_guard()
 template <class X, bool single>
 inline bool EventEngine<X, single>::repeats_level(std::span<const std::size_t> fired)
 {
-    // A loop of any length is met where a set is compared with the last one whose number is a power
-    // of two.
+    // Finds a loop of any length: a set is compared with the last one whose number is a power of
+    // two.
     if (level_ > 0 && cascade_.is(step_.x0(), step_.mode(), fired)) return true;
     if (std::has_single_bit(++level_)) {
         cascade_.x = step_.x0();
@@ -147,7 +147,7 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
     const GuardInfo& info = record.info;
     const double g = bank_.g0(i);
     if (!std::isfinite(g)) throw_start_guard_not_finite(who_, i, info.name, options_.t_start, g);
-    // A restart may leave it on the side that it had before its event at this time.
+    // A restart may leave the guard on the side on which it was before its event at this time.
     const bool had_event = !begins && !record.acting && has_event_at(i, began_at_);
     const bool on =
         g == 0 || ((info.unilateral ? g < 0 : had_event) && std::fabs(g) <= rounding_of(i));
@@ -163,7 +163,7 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
     bank_.arm(i, side);
     if (side == Side::plateau) bank_.await(i, life::awaited_side(life::Cause::start, info, side));
     if (arming == life::Arming::waits) {
-        // One that fires at the start has done so in the run before.
+        // A guard with `at_start` has already fired in the run that this one continues.
         const bool is_known = !begins && info.at_start && options_.continues;
         if (!record.acting || is_known) return;
         if (is_beyond(side, info.crossing)) count_armed_beyond(i, on);
@@ -279,7 +279,7 @@ inline void EventEngine<X, single>::arm_all()
         }
     });
     first_set_ = false;
-    // What the events of the start have moved back is not beyond its surface.
+    // Guards that the events at the start have moved back are not beyond their surfaces any more.
     if (run_.statistics.armed_beyond > 0 && step_.time(0) == began_at_) forget_armed_beyond();
 }
 
@@ -414,7 +414,8 @@ bool EventEngine<X, single>::is_set_in_motion(std::size_t i)
 {
     if (!left_known_) return false;
     if (!on_time_) {
-        // A reset that lets a crossing of this instant go on adds no event to it.
+        // A guard that has had its event at this instant does not have it again because a reset of
+        // another guard lets its crossing go on.
         const double t = step_.time(0);
         const double ago = std::fabs(t - std::as_const(bank_)[i].last);
         if (!stands(i) || ago <= resolution_.blur(t)) return false;
@@ -437,7 +438,7 @@ inline bool EventEngine<X, single>::is_flipped_by_rounding(std::size_t i, Side b
     const double g = bank_.g0(i);
     if (record.fired || record.newly_enabled || record.info.boolean) return false;
     if (before == Side::plateau || side_of(g) != opposite(before)) return false;
-    // Otherwise the reset of another guard has carried it across, by more than rounding.
+    // If it is farther away, the reset of another guard has carried it across.
     return lies_within_rounding(i);
 }
 
@@ -446,7 +447,7 @@ inline bool EventEngine<X, single>::lies_within_rounding(std::size_t i)
 {
     const double g = bank_.g0(i);
     const double rate = system_->bounded ? bank_.complete_rate0(i, step_, h_next_, calls())
-                                         : bank_.rate0(i);  // which may not be known otherwise
+                                         : bank_.rate0(i);  // with bounds it may not be known
     const double moves = std::fabs(rate) * (std::fabs(step_.time(0)) + h_next_);
     if (!(std::fabs(g) <= tolerances::by_rounding * std::max(bank_.armed_scale(i, h_next_), moves)))
         return false;

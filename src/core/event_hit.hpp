@@ -62,9 +62,9 @@ struct Note {
 /// Halves a bracket by the sides of the guard alone, down to the tolerance or neighbouring doubles.
 void bisect(GuardPath& path, GuardSample& lo, GuardSample& hi, double tolerance);
 
-/// The places inside a step, as fractions, at which guards are evaluated of which only the sign has
-/// a meaning: where numbers are, and at all of those places in a step so long that few of its
-/// length make the run.
+/// The fractions of a step at which guards are evaluated whose values carry only a sign: those at
+/// which other guards are evaluated too, and a longer list in a step so long that few of its length
+/// make the run.
 class SignChecks {
 public:
     static constexpr std::size_t most = CubicCheck::places.size() + 1;
@@ -80,13 +80,13 @@ public:
     /// Whether all places are asked for by the length of the step.
     [[nodiscard]] bool is_long(double h) const noexcept { return inside_ && std::fabs(h) > long_; }
 
-    /// For a search. `everywhere`: the step has been screened there.
+    /// The places for a search. `everywhere`: guards have been evaluated at all of them.
     [[nodiscard]] std::span<const double> places(double h, bool everywhere) const noexcept
     {
         if (everywhere_ || everywhere || is_long(h)) return all;
         return std::span(few).first(inside_ ? few.size() : 0);
     }
-    /// For a step that is screened guard by guard.
+    /// The places for a step that is screened guard by guard.
     [[nodiscard]] std::span<const double> places_screened(double h) const noexcept
     {
         return is_long(h) ? std::span<const double>(all) : std::span(few).first(inside_ ? 1 : 0);
@@ -123,7 +123,7 @@ struct Hit {
     Finding finding;
     double guess = 0;       ///< [s] estimated offset of the root
     bool departed = false;  ///< it is to be located
-    double value = 0;       ///< else the guard at the end of the window
+    double value = 0;       ///< if not: the guard at the end of the window
     bool located = false;
     Location where;
 };

@@ -271,7 +271,7 @@ public:
         return lost_from(step, straight_from_, space_.x, space_.dxdt, c);
     }
 
-    /// Remembers the same for all components, since repeats of the step forget it.
+    /// Stores `lost_at_set` of all components, since repeats of the step forget it.
     void keep_lost(const CurrentStep& step)
     {
         if (before_.size() > tolerances::remembered_components) return;
@@ -296,7 +296,7 @@ public:
         rated_at_set_ = kept_rated_;
     }
 
-    /// Whether the state of a note is that of the step's polynomial.
+    /// Whether any note takes its state from the step's polynomial.
     [[nodiscard]] bool shows_polynomial() const noexcept
     {
         return std::any_of(notes_.begin(), notes_.end(), [this](const Note& note) {
@@ -451,7 +451,7 @@ private:
             ++changes;
             return counts(opposite(side), probe.crossing());
         };
-        // The bits of an event do not depend on where else the guard has been evaluated.
+        // The bits of an event must not depend on where else the guard has been evaluated.
         const bool whole = resolution_.is_finest();
         for (const double u : signs_.places(h, bank.checked_everywhere())) {
             if (!(u * h > start.s && u * h < end.s)) continue;
@@ -507,7 +507,8 @@ private:
         return departure(probe, watch, covered);
     }
 
-    /// A candidate among several, of which that with the first root is located first.
+    /// The finding of one candidate among several, or the earlier departure that its bounds show.
+    /// (The candidate with the first root is located first.)
     [[nodiscard]] Finding first_under_bound(Probe& probe, const Watch& watch, const Bank& bank,
                                             const Finding& finding)
     {
@@ -566,7 +567,8 @@ private:
         return finders_->examine(probe, watch);
     }
 
-    /// The rounding of a guard that decays within the step, in this part of the step.
+    /// Takes the rounding of a guard that decays within the step from its size in this part of the
+    /// step.
     static void judge_by_its_own_size(Watch& watch, const Bank& bank, std::size_t i) noexcept
     {
         const double width = watch.end.s - watch.start.s;
@@ -713,7 +715,7 @@ private:
         bank.go_on_from(i, side, away(side, s));
     }
 
-    /// Whether the guard is on the surface, within rounding, and heads for `side`.
+    /// A sample at s of a guard that is on its surface, within rounding, and heads for `side`.
     [[nodiscard]] static GuardSample away(Side side, double s) noexcept
     {
         const double least = sign_of(side) * std::numeric_limits<double>::min();

@@ -142,7 +142,8 @@ inline double EventSearch<X, single>::lacks(const CurrentStep& step, Bank& bank,
             const bool known = &x == &before_ && is_at_change(step, hit, at, t);
             hit.value = known ? change_.at.value : bank.view(i, step.mode(), calls).value(t, x);
             if (has_left(hit.side, hit.value)) continue;
-            // A member that the window has put together with later ones may have turned back.
+            // A guard of the set that the window has put together with later ones may have turned
+            // back.
             if (!(at_ - hit.where.root <= resolution_.blur(t))) continue;
             const double wait = std::fabs(hit.value / hit.where.slope);
             longest = wait > longest || wait != wait ? wait : longest;
@@ -196,7 +197,7 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
         }
         if (holds(room)) return true;
     }
-    // Rounding may hide it there, too.
+    // Rounding may hide the condition at the end of the bracket, too.
     const double finest = finest_bracket(at_, step.h());
     for (double beyond = finest; beyond <= 8 * finest; beyond *= 2) {
         const double ahead = std::max(room, 0.0) + beyond;
@@ -204,8 +205,8 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
         move(x, before_, ahead, rate_);
         if (holds(ahead)) return true;
     }
-    // A state that the flow moves by less than its last place stays where it is: by units in the
-    // last place of its components.
+    // A state that the flow moves by less than its last place would not change: its components are
+    // moved by units in the last place.
     assign(x, before_);
     for (int k = 0; k < 4; ++k) {
         for_each_component(x, [&](auto i) {

@@ -121,7 +121,7 @@ public:
     }
 
     /// Whether the guards, evaluated again at the end of the step, have the values that they had
-    /// there before. Those whose checks are deferred are left alone.
+    /// there before. Guards whose checks are deferred are not evaluated.
     [[nodiscard]] bool end_alike(const Step<X>& step, std::uint64_t& calls)
     {
         const double t = step.time(step.h());
@@ -260,8 +260,9 @@ public:
                                    std::fabs(g1_[i] - rate1_[i] * (h / 3))));
     }
 
-    /// The same for a guard that has just been sampled at the start of a step. A guard with bounds
-    /// may have slept, and its other samples are of any earlier step.
+    /// As `scale`, for a guard that has just been sampled at the start of a step. A guard with
+    /// bounds may have been deferred, and its other samples may belong to an earlier step: its
+    /// largest value so far is used instead.
     [[nodiscard]] double armed_scale(std::size_t i, double h) const noexcept
     {
         return rules_.bounded ? sizes_[i] : scale(i, h);

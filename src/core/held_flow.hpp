@@ -44,9 +44,9 @@ struct HeldFlow {
 template <class X>
 inline constexpr SystemTable<X> HeldFlow<X>::table = HeldFlow<X>::make_table();
 
-/// The library's kernel of the same method that calls the flow by pointer. Of a method that is none
-/// of the library's: that of its orders, else Dormand and Prince's, or for fixed steps rk4. A
-/// host's steps stay its own.
+/// The library's kernel of the same method that calls the flow by pointer. A method that is not the
+/// library's gets the kernel with the same orders, else Dormand and Prince's, or rk4 for fixed
+/// steps. A host's steps stay its own.
 template <class X>
 [[nodiscard]] const StepKernel<X>& kernel_by_pointer(const StepKernel<X>& kernel, std::size_t size)
 {

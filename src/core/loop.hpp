@@ -304,8 +304,8 @@ private:
 
     void refuse_bad_restart(double t, const X& x, Mode mode) const;
     void start_at(double t, const X& x, Mode mode);
-    /// Drops what was recorded after t, but for the last `count` events, those of the restart
-    /// there, from `recorded` on, which `advance` is to show.
+    /// Drops what was recorded after t, except the events from number `recorded` on, those of a
+    /// restart at t. `advance` is to show the last `count` events.
     void show_from_restart(double t, std::ptrdiff_t recorded, std::uint64_t count);
     /// Drops what was recorded after time t.
     void drop_from(double t);
@@ -400,10 +400,10 @@ private:
         return limited ? std::min(options_.stall_steps, most) : 0;
     }
 
-    /// Whether the time has hardly advanced since a review that is due, or, without an event, so
-    /// little that not even a hundred times `max_steps` would reach the end. A motion that goes on
-    /// at the pace that it has had from the start, as an oscillation does, is never meant, however
-    /// far the end lies.
+    /// Whether the time has hardly advanced since a review that is due, or has, without an event,
+    /// advanced so little that not even a hundred times `max_steps` would reach the end. A motion
+    /// that keeps the pace that it has had from the start, as an oscillation does, does not stand
+    /// still in this sense, however far the end lies.
     [[nodiscard]] bool stands_still() const noexcept
     {
         const Statistics& counts = run_.statistics;
@@ -431,7 +431,8 @@ private:
                 advances_less(pace_review_, part));
     }
 
-    /// Number of instants with a set of events that have to advance the time as `stall_steps` do.
+    /// Number of instants with events that have to advance the time as much as `stall_steps` steps
+    /// have to.
     [[nodiscard]] std::uint64_t instants_to_stall() const noexcept
     {
         return std::max<std::uint64_t>(options_.stall_steps / 10, 1);
@@ -572,13 +573,13 @@ private:
     /// Keeps a motion at rest until a time event or the end.
     void hold(double remaining);
 
-    /// Takes a step of a motion of which something is held.
+    /// Takes a step of a motion in which some components are held.
     void advance_held(double remaining);
-    /// Shortens the step to where the flow lifts something that is held. False: the run has ended.
+    /// Shortens the step to where the flow lifts the guard of a hold. False: the run has ended.
     [[nodiscard]] bool shorten_to_release();
-    /// Whether the current step, if it stands, ends there.
+    /// Whether the current step, if it stands, ends where a hold is released.
     [[nodiscard]] bool ends_at_release() const noexcept { return step_.h() == release_at_; }
-    /// Accepts it, and lets that go free.
+    /// Accepts that step, and releases the hold.
     void pass_to_release();
     // --- phases ---
 
@@ -704,9 +705,9 @@ private:
     void add_sample(X&& x, double offset);
     /// Adds the reactions of a sample.
     void add_reaction(double t, const X& x, double offset);
-    /// Those at time t, where the state is x: s [s] after the start of a step.
+    /// The reactions at time t, where the state is x: s [s] after the start of a step.
     [[nodiscard]] std::vector<double> reaction_at(const PhasePlace<X>& place) const;
-    /// Those at the end of the last step.
+    /// The reactions at the end of the last step.
     [[nodiscard]] std::vector<double> reaction_here() const;
 
     // --- saving ---

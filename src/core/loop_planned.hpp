@@ -31,7 +31,8 @@ inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& ho
     const std::uint64_t rejected = run_.statistics.rejected;
     if (!take_step(remaining)) {
         if (is_tentative()) {
-            // The failure may lie beyond an event, which is found without looking ahead.
+            // The failure may lie beyond an event; steps that are checked one by one find the event
+            // first.
             ended_ = false;
             run_.outcome = Outcome::reached_end;
             take_back();

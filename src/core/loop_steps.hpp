@@ -94,7 +94,7 @@ template <class X, bool single>
 inline void Loop<X, single>::advance_from_here(const Advance& how)
 {
     const double remaining = step_.until(options_.t_end);
-    // At the double of the end only a time event can be left.
+    // When the time has reached the end, only a time event can still be due.
     const bool arrived =
         step_.start().value == options_.t_end && !(timed_ && step_.until(time_event_) <= remaining);
     if (arrived || !(remaining > 0)) return reach_end();
@@ -149,7 +149,7 @@ inline void Loop<X, single>::reach_end()
         planner_->check_last(step_, bank_, run_.statistics);
         if (planner_->wrong()) return this->name_wrong_bound();
     }
-    // The largest double is no end that a run without an end was meant to reach.
+    // A run without an end that reaches the largest double has not reached an end.
     end(endless_ ? Outcome::stalled : Outcome::reached_end);
 }
 
@@ -246,7 +246,8 @@ inline bool Loop<X, single>::retry(double h, double proposed, double largest, do
         }
         ++run_.statistics.rejected;
         const bool finite = std::isfinite(error);
-        // Without looking ahead the surface decides how the step is shortened.
+        // The interval is rolled back, and its steps are checked one by one: then the surface
+        // decides how the step is shortened.
         if (!finite && is_tentative()) {
             end_step(Outcome::non_finite);
             return false;
@@ -319,7 +320,7 @@ template <class X, bool single>
 void Loop<X, single>::advance_held(double remaining)
 {
     if (resting_) return hold(remaining);
-    if (defers_) this->watch_all();  // bounds are those of the flow, and not of what is left of it
+    if (defers_) this->watch_all();  // bounds hold for the flow, not for what a rest leaves of it
     mark_everything();
     if (!take_step(remaining) || !shorten_to_release()) return;
     if (handle_events()) return;
@@ -334,7 +335,8 @@ bool Loop<X, single>::shorten_to_release()
         s == 0 ? assign(x, step_.x0()) : s == h ? assign(x, step_.x1()) : step_.interpolate(s, x);
     });
     release_at_ = infinity;
-    // Where the lift is bent by more than a sixteenth the steps are not to grow.
+    // Steps are limited so that the lift deviates from a straight line by about a sixteenth of its
+    // size.
     constexpr double most = 1.0 / 16;
     if (error_controlled_ && release.bend > 0) {
         const double factor = std::max(0.5, std::sqrt(most / release.bend));
@@ -352,7 +354,7 @@ bool Loop<X, single>::shorten_to_release()
             return false;
         }
     }
-    if (!time_event_due_) {  // which would come first, and what it leaves is lifted after it
+    if (!time_event_due_) {  // a time event comes first, and holds are released after it
         release_at_ = step_.h();
         released_ = release.hold;
     }

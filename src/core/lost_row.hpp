@@ -26,8 +26,8 @@ namespace ricochet::detail {
 /// with the largest loss counts.
 class LossByRounding {
 public:
-    /// Records the excursion of that size that ended at t [s] after an interval [s]. Of a guard
-    /// that has several surfaces, one in each mode, each has its own rounding.
+    /// Records the excursion of that size that ended at t [s] after an interval [s]. If the guard
+    /// has several surfaces, one in each mode, each has its own rounding.
     void see(double t, double interval, double size, double rounding) noexcept
     {
         if (!(size > 0)) return;
@@ -51,7 +51,7 @@ public:
         weight_ = weight;
         part_ = part;
     }
-    /// Time [s] that is lost of a motion that was seen to end at t [s].
+    /// Time [s] that rounding takes from a motion that was seen to end at t [s].
     [[nodiscard]] double time(double t) const noexcept
     {
         return part_ / (1 - part_) * std::fabs(t - t_);
@@ -78,8 +78,8 @@ private:
 /// Excursions of one guard from its surface, from one acting instant to its event at the next.
 class Excursions {
 public:
-    /// Whether the rounding of the guard has to be known for an excursion of that size: it changes
-    /// slowly.
+    /// Whether the rounding of the guard has to be computed for an excursion of that size. It
+    /// changes slowly, and is computed again only after some excursions, or when they are small.
     [[nodiscard]] bool wants_rounding(double size) const noexcept
     {
         return !(size > tolerances::of_fading * rounding_ && age_ < most_age);
@@ -92,27 +92,28 @@ public:
     }
     [[nodiscard]] double rounding() const noexcept { return rounding_; }
 
-    /// Records one of that size, too large to be lost. Returns its part of the one before.
+    /// Records an excursion of that size, too large to be lost. Returns its size as a part of the
+    /// one before.
     double pass(double size) noexcept
     {
         lost_ = 0;
         if (!(size > 0)) return 1;
         const double last = std::exchange(last_, size);
         const double part = size / last;
-        // One that is far smaller may begin another motion. One that is larger does so only where
-        // it is not small beside the largest: rounding of other guards may have sustained it.
+        // A far smaller excursion may begin another motion. A larger one does so only where it is
+        // not small beside the largest: rounding of other guards may have sustained it.
         if (part > 0) fallen_ = std::min(fallen_ * std::max(part, 1.0 / 64), 1.0);
         return part;
     }
-    /// Records one that has not been seen at all: the guard had its next event at time t [s], the
-    /// instant of the event before.
+    /// Records an excursion that has not been seen at all: the guard had its next event at time t
+    /// [s], the instant of the event before.
     void vanish(double t) noexcept
     {
         if (lost_++ == 0) lost_from_ = end_;
         end_ = t;
     }
-    /// Records one of that size. False: it is neither lost in the rounding of the guard, nor has it
-    /// fallen to a thousandth.
+    /// Records an excursion of that size. False: it is neither lost in the rounding of the guard,
+    /// nor has it fallen to a thousandth.
     [[nodiscard]] bool fall(double size) noexcept
     {
         const std::uint32_t lost_before = lost_;
@@ -125,25 +126,26 @@ public:
         lost_ = lost ? lost_before + 1 : 0;
         return lost || has_fallen();
     }
-    /// Whether they have fallen to a thousandth, in more than one step.
+    /// Whether excursions have fallen to a thousandth, in more than one step.
     [[nodiscard]] bool has_fallen() const noexcept { return fallen_ <= 0x1p-10; }
-    /// How many in a row have been lost.
+    /// Number of the last excursions in a row that have been lost.
     [[nodiscard]] std::uint32_t lost() const noexcept { return lost_; }
 
     [[nodiscard]] LossByRounding& loss() noexcept { return loss_; }
 
-    /// Records that the last one ended at t [s], and the rate [1/s] of the guard there.
+    /// Records that the last excursion ended at t [s], and the rate [1/s] of the guard there.
     void end(double t, double slope) noexcept
     {
         if (lost_ == 1) lost_from_ = t;
         end_ = t;
         slope_ = slope;
     }
-    /// [s]
+    /// Time [s] at which the last excursion ended.
     [[nodiscard]] double end() const noexcept { return end_; }
-    /// Uncertainty [s] of the limit at time t: while excursions are lost, the time since they are,
-    /// and what was left then; else what the rounding of one event adds to all later ones; at least
-    /// the loss by all. Speeds, and with them intervals, fall by the root of what excursions do.
+    /// Uncertainty [s] of the limit at time t. While excursions are lost, it is the time since they
+    /// are, and what was left then; else what the rounding of one event adds to all later ones. It
+    /// is at least the loss by all excursions. Speeds, and with them intervals, fall by the root of
+    /// what excursions do.
     [[nodiscard]] double error(double t) const noexcept
     {
         const double q = std::sqrt(std::clamp(1 - usual_decay_, 0.0, 0.98));
@@ -211,7 +213,7 @@ public:
         quick_ = soon ? quick_ + 1 : 0;
         return quick_ >= 3;
     }
-    /// Whether an acting instant at t would.
+    /// Whether an acting instant at t would follow the one before so soon.
     [[nodiscard]] bool would_follow_soon(const Instant& t) const noexcept
     {
         return started_ && interval_to(t) <= longest_ / 32 && quick_ >= 2;

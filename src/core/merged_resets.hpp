@@ -60,8 +60,8 @@ public:
                                   set.t, before, after_);
     }
 
-    /// Applies the reset of guard i, which has left the state `before`, to the state x. Components
-    /// that it leaves alone keep their values before. Whether it changes anything.
+    /// Applies to the state x the reset of guard i, which has left the state `before` unchanged.
+    /// Components that it leaves alone keep their values before. True: it changes something.
     [[nodiscard]] bool ask_again(const SystemAt<X>& system, std::size_t i, Mode mode, double t,
                                  X& x, const X& before)
     {
@@ -279,8 +279,8 @@ private:
         return any;
     }
 
-    /// Whether all that change a component give it one value: what is left to ask where the flow is
-    /// a host's. They share nothing then.
+    /// Whether all members that change a component give it the same value. That is the only test
+    /// where the flow is a host's; the members then share nothing.
     [[nodiscard]] bool agree(const X& before, Mode mode)
     {
         for (const Member& one : members_) {
@@ -297,8 +297,8 @@ private:
         return true;
     }
 
-    /// Marks members of which one sets a component of the other back to its value before: it
-    /// changes nothing there when it is asked alone.
+    /// Marks members of which one sets a component that another one changes back to its value
+    /// before: asked alone, the reset changes nothing there.
     template <class Reset>
     [[nodiscard]] bool undo_one_another(const X& before, Mode mode, const Reset& reset)
     {
@@ -323,7 +323,7 @@ private:
         return any;
     }
 
-    /// The changes of the members that share nothing, and one mode for all.
+    /// Merges the changes of the members that share nothing, and takes one mode for all.
     void merge(const X& before, Mode mode)
     {
         for (const Member& member : members_) {
@@ -368,7 +368,8 @@ private:
         if (asks_pairs) name_pair(before, mode, reset, stands);
     }
 
-    /// Applies the group in one order, and adds what each member adds and where it ends.
+    /// Applies the group in one order, and adds to the records what each member adds and where the
+    /// order ends.
     template <class Reset, class Stands>
     void take_in_order(std::span<const std::size_t> order, const X& before, Mode mode,
                        const Reset& reset, const Stands& stands)
@@ -412,7 +413,8 @@ private:
                 added_.push_back(added.least);
             }
             if (each_is_one) {
-                // In an order of their own, so that the declared one does not matter.
+                // The terms are sorted, so that the order in which guards are declared does not
+                // matter.
                 std::sort(added_.begin(), added_.end());
                 double value = at(before, c);
                 for (const double added : added_) value += added;

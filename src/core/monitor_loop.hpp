@@ -334,7 +334,7 @@ private:
         this->begin_instant();
     }
 
-    /// The same for a step in which components are held: no farther than to where they go free.
+    /// Examines a step in which components are held, no farther than to where they are released.
     [[nodiscard]] Verdict check_held(const HostStepTable& step)
     {
         const auto release = this->first_release(step.h, [this, &step](double s, X& x) {

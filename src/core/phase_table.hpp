@@ -1,9 +1,9 @@
 // Phases of a run whose motion is not always that of the system's flow, as a table of pointers.
 //
 // A mode of such a run is a mode of the system and, in the bits above it, the kind of phase: kind 0
-// is the system's own flow. Who takes the steps depends on the mode; a step may end at a change
-// that its stepper has located by itself; after the resets of every set the phases decide how the
-// motion goes on. Everything else is the loop's.
+// is the system's own flow. The mode determines which stepper takes the steps. A step may end at a
+// change that its stepper has located by itself, and after the resets of every set the phases
+// decide how the motion goes on. Everything else is the loop's.
 #pragma once
 
 #include <cstddef>
@@ -105,8 +105,8 @@ struct PhaseTable {
     /// Whether the last set has an event of its own for a guard of the system: not for one that
     /// stands for a reaction whose change is recorded under another guard.
     bool (*records)(Door, std::size_t guard) = nullptr;
-    /// Whether the phase goes on after a step, seen at a glance; else `review` decides. Null: it
-    /// always does.
+    /// Whether the phase goes on after a step, as far as a quick test tells; else `review` decides.
+    /// Null: it always does.
     /// @param has_advanced  as in `PhaseStep`
     bool (*goes_on)(Door, Mode, double t, const X& x, bool has_advanced) = nullptr;
     /// The phase after a step. May move x onto a surface.
@@ -115,7 +115,8 @@ struct PhaseTable {
     PhaseVerdict (*give_up)(Door, const PhaseEnd<X>&, X& x) = nullptr;
     /// A sentence about the end that the phases have given to the run, or an empty one.
     std::string_view (*reason)(Door) = nullptr;
-    /// Moves the list of phases to `phases`, where it goes on; may be null, as the two below.
+    /// Moves the list of phases to `phases`, where it goes on. This function and the two below may
+    /// be null.
     void (*list_in)(Door, std::vector<MotionPhase>& phases) = nullptr;
     /// Writes the reactions at a place in the current step, or in one that has just ended.
     void (*reaction)(Door, const PhasePlace<X>&, std::vector<double>& r) = nullptr;

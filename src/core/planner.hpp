@@ -272,7 +272,8 @@ public:
     /// The bound that a guard has violated.
     [[nodiscard]] const std::optional<WrongBound<X>>& wrong() const noexcept { return wrong_; }
 
-    /// Forgets a violation that the motion from here on is not known to repeat.
+    /// Forgets a recorded violation. After a restart, or a return to an earlier step, the motion
+    /// from here on need not repeat it.
     void forget_wrong() noexcept { wrong_.reset(); }
 
     template <class Visit>
@@ -378,7 +379,7 @@ private:
         plan_after(i, check, now, mode, bank);
     }
 
-    /// The same, from the end of a step that has been examined.
+    /// Defers the guard from the end of a step that has been examined, and queues its deadline.
     void defer_from(std::size_t i, Check end, Mode mode, const Bank& bank)
     {
         end.bound = bound(i, end, mode, bank[i].side);
@@ -583,11 +584,12 @@ private:
 
     void blame(std::size_t i, const Check& from, const Check& to, double allowed);
 
-    /// Reports a deferred guard that is beyond its surface, whatever its bounds say there.
+    /// Evaluates a deferred guard, and reports a bound as wrong that the value contradicts. A guard
+    /// beyond its surface is reported whatever its bounds allow there.
     void watch_sleeper(std::size_t i, Check now, Mode mode, const Bank& bank, Statistics& counts);
 
-    /// Whether an exact value contradicts the bound that would have replaced it. Beyond the
-    /// surface a bound may have ended at 0.
+    /// Reports a declared bound that an exact value contradicts. Beyond the surface a bound may
+    /// have ended at 0.
     void check_bound(std::size_t i, const Check& check, Mode mode, const Bank& bank);
 
     void check_against(double bound, std::size_t i, const Check& check, const Bank& bank);

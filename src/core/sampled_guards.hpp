@@ -170,8 +170,8 @@ protected:
         }
     }
 
-    /// The same at an end of the run, as `CoreGuard::rate_inside`, from the values there in
-    /// `rates`.
+    /// Rates of all guards at an end of the run, by the differences of `CoreGuard::rate_inside`,
+    /// from the values there in `rates`.
     void difference_inside(const SamplePoint<X>& at, Doubles& rates)
     {
         const double delta =

@@ -99,8 +99,8 @@ public:
         return {};
     }
 
-    /// Evaluates them a second time, at the part `CubicCheck::further` of the step where the state
-    /// is `x`.
+    /// Evaluates all guards a second time, at the part `CubicCheck::further` of the step where the
+    /// state is `x`.
     void sample_further(const Step<X>& step, const X& x, std::uint64_t& calls)
     {
         const double s = CubicCheck::further * step.h();
@@ -108,8 +108,8 @@ public:
         checked_ = Checked::further;
     }
 
-    /// The same for the guards in doubt alone, if they are few, on the step's polynomial. The
-    /// others count as being on their cubics there.
+    /// Evaluates only the guards in doubt a second time, if they are few, on the step's polynomial.
+    /// The others count as being on their cubics there.
     [[nodiscard]] bool sample_doubtful_further(const Step<X>& step, std::uint64_t& calls)
     {
         if (are_few() || !marked_ || marks_.size() > size() / 4 || !system_->guard_on) return false;
@@ -126,7 +126,7 @@ public:
         return true;
     }
 
-    /// Evaluates them once more, at the part `u` of the step, one of `CubicCheck::places`.
+    /// Evaluates all guards once more, at the part `u` of the step, one of `CubicCheck::places`.
     void sample_place(const Step<X>& step, double u, const X& x, std::uint64_t& calls)
     {
         sample_values(step.mode(), step.time(u * step.h()), x, calls, further_);

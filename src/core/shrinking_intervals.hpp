@@ -218,7 +218,8 @@ private:
         return std::fabs(rate) * interval_ * ratio_ / 4;
     }
 
-    /// What is left of the last interval that was one, once rounding decides [s].
+    /// Time [s] that the last interval between distinguishable events leaves open once rounding
+    /// decides; before, 0.
     [[nodiscard]] double unresolved() const noexcept
     {
         return stalled_ > most_at_once ? 8 * interval_ : sunk_ > 0 ? 2 * interval_ : 0;

@@ -112,8 +112,9 @@ public:
         const double ahead = state_.start.until(t);
         return state_.backward ? -ahead : ahead;
     }
-    /// Declares that the step of length h from here ends at t, whatever time its sum rounds to: a
-    /// guard that is zero at t is zero at its end. NaN: no step does.
+    /// Declares that the step of length h from here ends at exactly t, although start + h may round
+    /// to a neighbour: a guard that is zero at t is then zero at the end of the step. With h = NaN
+    /// no step ends at a given time.
     void pin(double h, double t) noexcept
     {
         pinned_h_ = h;
@@ -392,7 +393,7 @@ public:
 
     // --- time events, at which the flow may jump ---
 
-    /// Has the flow of the step that was taken seen a jump at its end, the time event at t? From
+    /// Whether the flow jumps at the end of the step that was taken, at the time event at t. From
     /// here on no stage sees the flow there, but that of the double before. False for hosts.
     bool sees_jump_at_end(double t)
     {
@@ -473,11 +474,11 @@ public:
 
     [[nodiscard]] bool is_aligned() const noexcept { return aligned_; }
 
-    /// An interpolant need not begin at the start state to the last bit, and one that is
-    /// evaluated at times is a staircase for offsets shorter than the time resolves. Either could
-    /// put a guard that starts on its surface behind it. So the difference is subtracted, all
-    /// of it at the start and none at the end, and over the first unit in the last place of the
-    /// time the path is straight.
+    /// Corrects the interpolant of a host at the start of its step. It need not begin at the start
+    /// state to the last bit, and if it is evaluated at absolute times it is constant over offsets
+    /// shorter than the time resolves. Either could put a guard that starts on its surface behind
+    /// it. So the difference at the start is subtracted, all of it at the start and none at the
+    /// end, and over the first unit in the last place of the time the path is a straight line.
     void align_start() const;
 
     /// Accepts a step that a host has taken.
@@ -659,7 +660,8 @@ public:
     /// Whether every call of the flow has given its rate as many components as the state.
     [[nodiscard]] bool flow_fits() const noexcept { return state_.flow_fits; }
     [[nodiscard]] std::uint64_t flow_calls() const noexcept { return state_.flow_calls; }
-    /// The place on the path of a host that cannot repeat its step is no such repetition.
+    /// Counts a repeat of the step. A host that cannot repeat its step gives a place on its path
+    /// instead, which is not counted.
     void count_restep() const noexcept { resteps_ += !state_.host || state_.host->restep; }
     [[nodiscard]] std::uint64_t resteps() const noexcept { return resteps_; }
 

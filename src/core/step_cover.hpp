@@ -80,7 +80,8 @@ private:
     static constexpr std::size_t few = 8;              ///< evaluations that tell how many it takes
     static constexpr double most_of_it = 1 - 0x1p-10;  ///< so that rounding leaves it closed
     static constexpr double finest_part = 0x1p-12;     ///< of the step, beside the surface
-    /// The same part of the interval, for a guard that follows the cubic through the ends.
+    /// Part of the interval that may stay open beside the surface, for a guard that follows the
+    /// cubic through the ends.
     static constexpr double cubic_rest = 0x1p-2;
     /// A guard that is elsewhere than its cubic comes this close to it one time in a thousand.
     static constexpr double cubic_part = 0x1p-10;

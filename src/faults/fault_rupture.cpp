@@ -76,7 +76,8 @@ public:
     {
         double from = 0;
         if (!(sign * velocity(0) > 0)) {
-            // It starts from rest: either it moves a little later, or it never did.
+            // An element that starts at rest begins to slip inside the step, or does not slip in
+            // it.
             from = 0.5;
             while (from > 1e-6 && !(sign * velocity(from) > 0)) from *= 0.5;
             if (!(sign * velocity(from) > 0)) return 0;

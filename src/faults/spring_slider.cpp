@@ -225,7 +225,7 @@ private:
     void locate(const SliderState& from, const SliderState& to, double level, SliderEventKind up,
                 SliderEventKind down)
     {
-        // For a step that starts on the level its end tells on which side it left.
+        // If the step starts on the level, the side is taken from its end.
         const double start = from.v == level ? to.v : from.v;
         if ((start - level) * (to.v - level) < 0 || (to.v == level && start != level)) {
             add(from, level, 0, to.t - from.t, start < level ? up : down);

@@ -231,7 +231,7 @@ void ContactPhases<C>::depart(const StepState<C>& step, double s, C& w, C& rate)
 template <class C>
 void ContactPhases<C>::make_kernels()
 {
-    // Power series are those of flows alone.
+    // Power series are only those of flows.
     flight_.guard_series = nullptr;
     flight_.cross = nullptr;
     contact_.order = contact_.error_order = 1;

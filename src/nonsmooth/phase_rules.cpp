@@ -259,7 +259,7 @@ bool PhaseRules::goes_by_itself(double t, const double* x)
     for (std::size_t i = 0; i < count(); ++i) {
         if (now_->watched[i] && !is_clear(i, y_[i], x)) return false;
     }
-    // No motion contradicts the inclusion of its own mode.
+    // The inclusion of a mode holds wherever the mode does, so that no motion may contradict it.
     return !by_mode_ || has_finite_bounds(inclusion().signs(t, x), t, x);
 }
 
@@ -739,7 +739,8 @@ PhaseRules::Verdict PhaseRules::review_implicit(Kind kind, double t, bool has_ad
     }
     if (lets_go(b, t, x)) return release(t);
     if (memory_.steps < memory_.patience || !inclusion().flows(b)) return {};
-    // The branch of a y that has just left zero tells its direction, so its size is not tested.
+    // The branch of a y that has just left zero tells its direction, so that its size is not
+    // tested.
     Mode tested = b;
     if (memory_.changed_at == t) {
         tested = BranchPhases::with_branch(inclusion().changed(), Branch::inside, b);

@@ -58,7 +58,7 @@ public:
     /// both bounds are finite, or a guard of the system stands for y. Another one with an infinite
     /// bound, such as the reaction of a floor to a speed, may be a law of some modes only.
     void choose_watched(ModeInclusion& of, const double* x0);
-    /// Lets the rules be about a mode of the system, until the next call.
+    /// Makes a mode of the system the one that the rules are about, until the next call.
     PhaseRules& in(const ModeInclusion& now) noexcept
     {
         now_ = &now;
@@ -66,7 +66,8 @@ public:
     }
     [[nodiscard]] const ModeInclusion& now() const noexcept { return *now_; }
 
-    /// Those of `BranchPhases`, and y, which is watched in own phases.
+    /// Number of guards for each reaction: those of `BranchPhases` and, unless the inclusion is
+    /// alone, one on y, which is watched in own phases.
     [[nodiscard]] std::size_t guards_of_reaction() const noexcept
     {
         return BranchPhases::guards_of_reaction + (options_.alone ? 0 : 1);
@@ -93,7 +94,7 @@ public:
     {
         return kind > branch_modes_ && kind <= across();
     }
-    /// Of a kind with branches, else 0.
+    /// The branches of a kind that has some, else 0.
     [[nodiscard]] Mode branches_of(Kind kind) const noexcept
     {
         if (is_approach(kind)) return kind - 1 - across();
@@ -107,7 +108,7 @@ public:
 
     // --- the motion ---
 
-    /// In implicit phases, and where nothing moves.
+    /// Writes the rate of the state in implicit phases, and where nothing moves.
     void flow(Kind kind, double t, const double* x, double* dxdt);
     /// See `BranchPhases::fraction_of_held`.
     [[nodiscard]] double fraction_of_held(BranchPhases& inclusion, Mode b, double t0,
@@ -119,7 +120,7 @@ public:
         if (options_.alone) return which;
         return BranchPhases::guards_of_reaction * reaction_of(which) + kind_of_guard(which);
     }
-    /// Whether it watches own phases.
+    /// Whether guard `which` of the phases watches own phases.
     [[nodiscard]] bool watches_own(std::size_t which) const noexcept
     {
         return !options_.alone && kind_of_guard(which) == BranchPhases::guards_of_reaction;
@@ -127,14 +128,14 @@ public:
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const;
     /// Whether a guard that watches own phases is enabled.
     [[nodiscard]] bool watches(std::size_t which, Kind kind) const;
-    // Those that do, and all guards outside explicit phases.
+    // Guards that watch own phases are evaluated here, and all guards outside explicit phases.
     [[nodiscard]] double guard(std::size_t which, double t, const double* x) const;
     void guards(Kind kind, double t, const double* x, std::span<double> g) const;
     [[nodiscard]] double guard_rate(std::size_t which, double t, const double* x,
                                     const double* dxdt) const;
     void guard_rates(Kind kind, double t, const double* x, const double* dxdt,
                      std::span<double> rates) const;
-    /// Sets the numbers of those that do.
+    /// Sets the numbers of the guards that watch own phases.
     void fill_watching(std::span<double> numbers, double to) const noexcept
     {
         if (options_.alone) return;
@@ -182,8 +183,8 @@ public:
     [[nodiscard]] bool step_back(double t, double* x);
     /// Whether the flow of the system at (t, x), on that side, is that of the inclusion.
     [[nodiscard]] bool is_flow(double t, const double* x, const double* rate);
-    /// The same at a start from which the inclusion decides, where every y is farther from zero
-    /// than a thousandth of what it reads: whatever the tolerances are.
+    /// As `is_flow`, at a start from which the inclusion decides, where every y is farther from
+    /// zero than a thousandth of what it reads, whatever the tolerances are.
     [[nodiscard]] bool is_flow_at_start(double t, const double* x, const double* rate);
     [[nodiscard]] Kind end_as_violated() { return end_with(Outcome::law_violated); }
     [[nodiscard]] std::span<const ReactionChange> changes() const noexcept { return changes_; }
@@ -203,7 +204,7 @@ public:
         double h_next;
         bool has_advanced;
     };
-    /// Whether the phase in branches b of an inclusion goes on, seen at a glance.
+    /// Whether the phase in branches b of an inclusion goes on, as far as a quick test tells.
     [[nodiscard]] bool goes_on(Kind kind, const BranchPhases& inclusion, Mode b, double t,
                                const double* x, bool has_advanced)
     {
@@ -231,7 +232,7 @@ public:
 
     // --- records ---
 
-    /// Of an inclusion alone.
+    /// How an inclusion alone has ended.
     [[nodiscard]] EndInBranches end_in_branches(double t, const double* x) const;
     /// A sentence about the end that the rules have given to the run.
     [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
@@ -243,7 +244,7 @@ public:
     }
     [[nodiscard]] std::uint64_t implicit_steps() const noexcept { return implicit_steps_; }
 
-    // In the mode in which the run is.
+    // The memory of the rules in the mode in which the run is.
     void save(std::vector<double>& memory) const;
     void restore(const std::vector<double>& memory);
 
@@ -296,7 +297,7 @@ private:
     {
         return inclusion().decides_at_zero() && std::fabs(y) >= 1e3 * resolution(i, x);
     }
-    /// Whether the y of all reactions at a bound are.
+    /// Whether the y of all reactions at a bound are clear.
     [[nodiscard]] bool are_clear(Mode b, double t, const double* x);
     /// Whether branches b hold nothing and every y is clear.
     [[nodiscard]] bool lets_go(Mode b, double t, const double* x);
@@ -322,7 +323,7 @@ private:
     [[nodiscard]] bool goes_by_itself(double t, const double* x);
     /// The kind of phase where the y of the reactions marked inside are zero.
     [[nodiscard]] Kind settle(Mode at, double t, double* x, PhaseCause cause);
-    /// The same, where the mode of `BranchPhases` is b if there is one motion.
+    /// As `settle`, where the mode of `BranchPhases` is b if the motion is unique.
     [[nodiscard]] Kind determined_kind(Mode at, Mode b, double t, const double* x,
                                        PhaseCause cause);
     /// The kind of phase for a mode of `BranchPhases`.

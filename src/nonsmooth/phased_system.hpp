@@ -103,7 +103,8 @@ private:
         const std::size_t modes = own_.moded ? own_.mode_count(user_.door) : 1;
         return mode < (modes > 0 ? modes : own_modes - 1);
     }
-    /// The user's mode after a reset, or one that no system has.
+    /// The mode after a reset that returned a mode of the user's: one that no system has if the
+    /// user's does not exist.
     [[nodiscard]] Mode reached(Kind kind, Mode mode) const
     {
         return is_mode(mode) ? with(kind, mode) : std::numeric_limits<Mode>::max();
@@ -170,7 +171,7 @@ private:
     {
         if (i >= guards_) return rules_.guard_info(i - guards_);
         GuardInfo info = infos_[i];
-        // What stands for a y changes the motion there.
+        // A guard that stands for a y changes the motion at its event.
         if (stands_somewhere_[i] && !info.unilateral) info.resets = true;
         return info;
     }
@@ -394,7 +395,8 @@ private:
             step.x1, [&](auto i) { step.w[i] = (step.x1[i] - step.x0[i]) - h * step.rate0[i]; });
         return true;
     }
-    /// Below a billionth of a longest step the motion has no smoothness that shorter ones could
+    /// Error of an implicit step over its tolerance. A step of at most a billionth of the longest
+    /// is accepted whatever its error: the motion has no smoothness there that shorter steps could
     /// follow.
     [[nodiscard]] double attempt_implicit(StepState<C>& step, double h, double rtol, double atol)
     {
@@ -425,7 +427,8 @@ private:
             rate[i] -= step.rate0[i];
         });
     }
-    /// The error of a step that the held reactions do not follow asks for a shorter one.
+    /// Error of an explicit step over its tolerance. If the held reactions do not follow the step,
+    /// the error is that which asks for a shorter one.
     [[nodiscard]] double attempt_held(StepState<C>& step, double h, double rtol, double atol)
     {
         const double error = explicit_.kernel->attempt(explicit_.door, step, h, rtol, atol);
@@ -521,7 +524,8 @@ void PhasedSystem<C>::find_asked_reactions()
     refuse_partly_active();
 }
 
-/// Which guards a system of countless modes disables is not known before they are reached.
+/// Refuses modes in which the guards of some reactions are disabled and those of others are not. Of
+/// a system with very many modes only the first ones are examined.
 template <class C>
 void PhasedSystem<C>::refuse_partly_active() const
 {

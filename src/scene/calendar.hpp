@@ -133,10 +133,10 @@ private:
         }
         ahead_ = list + 1 < lists_.size() ? lists_[list + 1] : none;
     }
-    /// Builds new lists when all entries are late. The first quarter of the entries determines
-    /// their width, such that it has `in_a_list` entries a list. So a turn of the ring has at least
-    /// a quarter of the entries, and its cost is divided among as many events. False if there are
-    /// none.
+    /// Builds new lists when all entries are late. Their width is such that the first quarter of
+    /// the entries fills them with `in_a_list` entries each. A turn of the ring thus has at least a
+    /// quarter of the entries, and its cost is divided among as many events. False: there are no
+    /// entries.
     bool turn()
     {
         std::erase_if(late_, [&](std::uint32_t body) {

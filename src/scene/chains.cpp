@@ -1,5 +1,6 @@
-// Chains of segments from surfaces that end where others begin: a body that touches a corner passes
-// it by the same rules, whether one surface has both of its sides or each is a surface of its own.
+// Chains of segments from surfaces that end where others begin. A body that touches a corner passes
+// it by the same rules, whether the two sides of the corner belong to one surface or each is a
+// surface of its own.
 #include <map>
 
 #include "scene/motion.hpp"

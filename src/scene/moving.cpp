@@ -274,7 +274,7 @@ Meeting meet_moving(const World& world, std::uint32_t i, std::uint32_t which, co
     const Closing closing = first_closing(until, pair);
     Meeting meeting{.from = body.t, .after = closing.after};
     if (!(closing.after > 0) || !(closing.after < never)) return meeting;
-    // It has not risen above the rounding of its place.
+    // The gap has not opened by more than its rounding: the body presses on the surface.
     if (!closing.opened) return {.from = body.t, .after = 0, .presses = true};
     meeting.after = on_map(closing.after, until, [&](double s) {
         const Instant t = body.t.after(s);

@@ -42,10 +42,10 @@ struct Fields {
         return 1 - x[0];
     }
 #else
-double guard(double, const X& x) const
-{
-    return 1 - x[0];
-}
+    double guard(double, const X& x) const
+    {
+        return 1 - x[0];
+    }
 #endif
 #if CASE == 3
     void flow(double, const X&, X& v) const

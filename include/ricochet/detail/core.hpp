@@ -64,7 +64,8 @@ public:
     virtual void show_all() noexcept = 0;
     /// Number of events, of those recorded, that `advance` has shown.
     [[nodiscard]] virtual std::size_t shown_events() const noexcept = 0;
-    /// Takes one step, which may belong to an interval that is closed later if it looks ahead.
+    /// Takes one step. With `look_ahead` the step may stay tentative until a later check closes its
+    /// interval.
     virtual void advance_once(bool look_ahead) = 0;
     /// Takes the fastest way to the end, which `step` and `advance` do not take.
     virtual void run_to_end() = 0;

@@ -41,7 +41,7 @@ struct DetectorTable {
     bool (*leaves_plainly)(double sign, const GuardSample& start, const GuardSample& end,
                            double touch) = nullptr;
     Finding (*examine)(Self, GuardPath& path, Watch& watch) = nullptr;
-    /// Checks whether it fits the system, in steps between `smallest` and `largest` [s].
+    /// Checks whether the detector fits the system, in steps between `smallest` and `largest` [s].
     /// @throws std::invalid_argument if it does not
     void (*check)(Self, void* door, const X& x, double smallest, double largest) = nullptr;
 

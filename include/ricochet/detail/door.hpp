@@ -19,7 +19,7 @@
 
 namespace ricochet::detail {
 
-/// Arrays, which lie in a vector unchanged.
+/// Whether X is an array, which lies in a vector unchanged.
 template <class X>
 inline constexpr bool is_array = false;
 template <std::size_t n>

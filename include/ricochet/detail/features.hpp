@@ -158,8 +158,8 @@ void features(Recipe recipe, const System& system, const StepAhead<X>& step, dou
     }
 }
 
-/// Same for a step of length h from x at time 0, with the flow evaluated here, into a copy of the
-/// state.
+/// Computes the features of a step of length h from x at time 0, with the flow evaluated here, into
+/// a copy of the state.
 template <class System, class X>
 void features(Recipe recipe, const System& system, const X& x, double h, double* out) noexcept
 {

@@ -94,8 +94,8 @@ public:
         const RegionRates rates = normalised(around(both, slides, t, x).rates);
         const Continuation way = follow_shares(rates, from);
         if (way.to == slides) return slides;
-        // A motion that leaves at a rate of zero may turn back. Shares that are far from those with
-        // which it leaves may lead elsewhere.
+        // A motion that leaves at a rate of zero may turn back. It is followed with the shares with
+        // which it leaves, because others may select another exit.
         const auto later = [&](double time, const X& at) {
             const RegionRates r = around(both, slides, time, at).rates;
             const Continuation same = follow_shares(normalised(r), way.at);
@@ -104,9 +104,9 @@ public:
         return leads_away(way.margin, way.to, t, x, later) ? way.to : slides;
     }
 
-    /// The same after an exit, with the rates and shares a short time later, as soon as they are
-    /// beyond doubt. Where the combination has ceased to exist the shares stay near the place where
-    /// it did for a time proportional to 1 / sqrt(-apart).
+    /// The rule of `reset` on two surfaces after an exit, with the rates and shares a short time
+    /// later, as soon as they are beyond doubt. Where the combination has ceased to exist the
+    /// shares stay near the place where it did for a time proportional to 1 / sqrt(-apart).
     template <class X>
     [[nodiscard]] Places decide_after_exit(double t, const X& x) const
     {

@@ -71,7 +71,7 @@ template <class Fields>
     }
 }
 
-/// The same together with the `surface_guards` before them.
+/// The number of guards of the fields together with the `surface_guards` before them.
 template <class Fields>
 [[nodiscard]] consteval std::size_t guard_count_with(std::size_t surface_guards)
 {

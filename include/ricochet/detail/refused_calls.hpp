@@ -33,7 +33,6 @@ struct AnyStartGiven {
     AnyStartGiven(std::initializer_list<double>);
 };
 
-
 }  // namespace detail
 
 /// A call without options.

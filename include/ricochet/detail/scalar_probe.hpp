@@ -167,7 +167,7 @@ concept GuardTakesMode = requires(const System& s, std::size_t which, Mode mode,
     s.guard(mode, t, x);
 };
 
-/// The same for views of a state.
+/// A guard that takes any scalar, in views of a state.
 template <class System>
 concept GuardOfScalarViews = GuardOfScalars<System, ViewProbe>;
 
@@ -176,7 +176,7 @@ struct ArraysOf {
     template <class S>
     using Of = std::array<S, n>;
 };
-/// The same for arrays of n.
+/// A guard that takes any scalar, in arrays of n.
 template <class System, std::size_t n>
 concept GuardOfScalarArrays = n >
 0 && GuardOfScalars<System, ArraysOf<n>::template Of>;

@@ -102,8 +102,8 @@ struct GuardSeries {
     return std::min(std::min(q0, b1), std::min(b2, b3)) - less > touch;
 }
 
-/// The same with more terms, up to all of them. Takes a copy, so that the caller's stays in
-/// registers for `series_clears`, which decides nearly every step.
+/// As `series_clears`, with more terms, up to all of them. Takes a copy, so that the caller's stays
+/// in registers for `series_clears`, which decides nearly every step.
 [[nodiscard]] bool series_clears_closely(GuardSeries guard) noexcept;
 
 /// First event of the guard between the samples `start` and `end` in the step. Where the samples

@@ -77,7 +77,7 @@ struct SystemTable {
     GuardPoint (*point)(Door, GuardInMode, ScaledTime, const X& x, const X& dxdt) = nullptr;
     /// All rates, from one call of the system, with respect to the time itself.
     void (*rates)(Door, const Along<X>&, std::span<double> rates) = nullptr;
-    /// The same, from a call for each guard.
+    /// All rates, with a call for each guard, with respect to the time itself.
     void (*each_rate)(Door, const Along<X>&, std::span<double> rates) = nullptr;
 
     bool (*enabled_in)(Door, std::size_t which, Mode) = nullptr;

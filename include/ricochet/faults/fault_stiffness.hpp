@@ -69,8 +69,10 @@ private:
 /// Products with K, with scratch memory of their own. Each thread needs one.
 class StiffnessProduct {
 public:
+    /// Keeps a copy of `stiffness`, and allocates scratch memory where products take transforms.
     explicit StiffnessProduct(const FaultStiffness& stiffness);
     ~StiffnessProduct();
+    /// Takes the scratch memory over; the other object must not be used again.
     StiffnessProduct(StiffnessProduct&&) noexcept;
     StiffnessProduct& operator=(StiffnessProduct&&) noexcept;
 

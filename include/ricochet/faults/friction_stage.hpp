@@ -90,6 +90,7 @@ template <class Law>
 template <EliminableLaw Law>
 class StateElimination {
 public:
+    /// Keeps a reference to `law`. @param h  [s] length of the step
     StateElimination(const Law& law, double h) noexcept : law_(&law), h_(h) {}
 
     [[nodiscard]] const Law& law() const noexcept { return *law_; }
@@ -152,6 +153,7 @@ public:
         return {friction, a_ + b_ * xi_y, xi, xi_y};
     }
 
+    /// The state after a stage at rest.
     [[nodiscard]] double at_rest(double before) const
     {
         return before + wright_omega(log_a_ - before);
@@ -171,6 +173,7 @@ struct StageEquation {
     double xi = 0;            ///< xi^
 };
 
+/// How the solution of a stage ended.
 struct FrictionStageReport {
     int iterations = 0;   ///< evaluations of friction and state
     double residual = 0;  ///< |c V + N f - F| over the sum of their sizes
@@ -178,6 +181,7 @@ struct FrictionStageReport {
     bool convex = true;  ///< whether the incremental potential is convex at the solution
 };
 
+/// Slip rate, state and coefficient of friction at the end of a stage.
 struct StageSolution {
     double v = 0, xi = 0, friction = 0;
     FrictionStageReport report{};

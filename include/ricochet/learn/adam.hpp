@@ -16,6 +16,7 @@ namespace ricochet::learn {
 /// with m^ = m / (1 - b1^k) and v^ = v / (1 - b2^k) in step k = 1, 2, ...
 class Adam {
 public:
+    /// Constants of the method.
     struct Options {
         double beta1 = 0.9;     ///< in [0, 1)
         double beta2 = 0.999;   ///< in [0, 1)

@@ -11,6 +11,7 @@ namespace ricochet::learn {
 using SumOfSquares = std::function<double(const Eigen::VectorXd& p, Eigen::MatrixXd* normal,
                                           Eigen::VectorXd* gradient)>;
 
+/// Limits and tolerances of `levenberg_marquardt`.
 struct LevenbergMarquardtOptions {
     int iterations = 100;
     double seconds = 1e9;           ///< of processor time of this process
@@ -20,6 +21,7 @@ struct LevenbergMarquardtOptions {
     const std::atomic<bool>* cancelled = nullptr;  ///< true ends it after the sum in progress
 };
 
+/// How a minimisation ended.
 struct LevenbergMarquardtReport {
     int iterations = 0;      ///< accepted steps
     int trials = 0;          ///< sums of squares evaluated

@@ -693,6 +693,7 @@ struct NoModes {
 template <Branching System>
 class BranchModes : public detail::AnyModes<state_size<System>, reaction_size<System>> {
 public:
+    /// The modes of `system`, by solvers of its own size.
     explicit BranchModes(const System& system)
         : BranchModes::AnyModes(detail::exact_inclusion(system))
     {

@@ -25,6 +25,7 @@ struct RICOCHET_ALIGNED StateWithReaction {
 template <Inclusion System>
 using SetValuedState = detail::StateWithReaction<state_size<System>, reaction_size<System>>;
 
+/// Scheme of an implicit step.
 enum class Scheme {
     /// Over half the step the trapezoidal rule, then backward differences of three points
     /// over all of it: of order 2, and strongly damped at high frequencies (K.-J. Bathe and
@@ -47,6 +48,7 @@ enum class FirstStage {
     switch_aware,
 };
 
+/// Scheme of the implicit steps, and how their stages are solved.
 struct SchemeOptions {
     Scheme scheme = Scheme::bathe;
     FirstStage first_stage = FirstStage::averaged;

@@ -19,6 +19,7 @@
 
 namespace ricochet {
 
+/// How the solution of a contact problem ended.
 struct ContactReport {
     bool converged = false;
     /// The largest defect over the contacts, of velocity or impulse, in units in which W has a
@@ -31,6 +32,7 @@ struct ContactReport {
     int contact = -1;    ///< the contact of the largest defect
 };
 
+/// Tolerance and limits of `ContactSolver`.
 struct ContactOptions {
     double tolerance = 1e-10;  ///< of the residual
     int max_iterations = 40;   ///< of one attempt of Newton's method
@@ -57,6 +59,7 @@ struct ContactOptions {
 /// reported as unsolved.
 class ContactSolver {
 public:
+    /// Keeps a copy of `options`.
     explicit ContactSolver(const ContactOptions& options = {});
 
     /// Improves `p`, the start of the iteration: the impulses of the previous step, or zero.

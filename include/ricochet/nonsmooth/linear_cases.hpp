@@ -27,6 +27,8 @@ enum class Branch : signed char { lower = -1, inside = 0, upper = 1 };
 /// The most unknowns that are solved by cases: 3^4 linear systems at worst.
 inline constexpr int most_cases = 4;
 
+/// A linear variational inequality of up to M unknowns, as at the head of this file. M may be
+/// `Eigen::Dynamic`.
 template <int M>
 struct RICOCHET_ALIGNED LinearInequality {
     using Vector = Eigen::Matrix<double, M, 1>;
@@ -74,6 +76,8 @@ struct RICOCHET_ALIGNED LinearInequality {
         return search(reaction, y, branches);
     }
 
+    /// Tries the given branches, then all others; more than `most_cases` unknowns go to the pivots.
+    /// True: `reaction`, `y` and `branches` are a solution.
     [[nodiscard]] bool search(Vector& reaction, Vector& y, Branches& branches) const;
 
     /// For any number of unknowns and a positive semidefinite W, even if reactions depend on one
@@ -91,6 +95,7 @@ struct RICOCHET_ALIGNED LinearInequality {
     /// not. False if they have none.
     [[nodiscard]] bool solve_on(const Branches& branches, Vector& reaction, Vector& y) const;
 
+    /// Whether a reaction on this branch holds its y at the target.
     [[nodiscard]] bool held(Branch branch) const noexcept
     {
         return confines == Confines::reaction ? branch == Branch::inside : branch != Branch::inside;
@@ -257,6 +262,7 @@ private:
     }
 };
 
+/// Tries one choice of branches after the other, those that determine the reactions first.
 template <int M>
 bool LinearInequality<M>::search(Vector& reaction, Vector& y, Branches& branches) const
 {
@@ -277,6 +283,7 @@ bool LinearInequality<M>::search(Vector& reaction, Vector& y, Branches& branches
     return false;
 }
 
+/// Takes proximal steps until they settle; each is a strictly monotone problem.
 template <int M>
 bool LinearInequality<M>::solve_by_pivots(Vector& reaction, Vector& y, Branches& branches) const
 {
@@ -308,6 +315,7 @@ bool LinearInequality<M>::solve_by_pivots(Vector& reaction, Vector& y, Branches&
     return y.allFinite();
 }
 
+/// Solves for the reactions that hold their y at its target; the others are known.
 template <int M>
 bool LinearInequality<M>::solve_on(const Branches& branches, Vector& reaction, Vector& y) const
 {
@@ -347,6 +355,7 @@ bool LinearInequality<M>::solve_on(const Branches& branches, Vector& reaction, V
     return y.allFinite();
 }
 
+/// Finds, where reactions depend on one another, those nearest to `near` that hold their y.
 template <int M>
 bool LinearInequality<M>::nearest_on(const Branches& branches, const Vector& b,
                                      Vector& reaction) const

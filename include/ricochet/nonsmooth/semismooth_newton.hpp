@@ -27,6 +27,7 @@ concept NewtonProblem = requires(Problem& problem, const Vector& x, Vector& out)
         } -> std::convertible_to<bool>;
 };
 
+/// Tolerance and limits of the method.
 struct NewtonOptions {
     double tolerance = 1e-12;  ///< of the largest component of F
     int max_iterations = 50;
@@ -34,6 +35,7 @@ struct NewtonOptions {
     int max_halvings = 25;
 };
 
+/// How an iteration ended.
 struct NewtonReport {
     bool converged = false;
     double residual = 0;  ///< the largest component of F at the end

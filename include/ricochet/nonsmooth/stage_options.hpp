@@ -3,6 +3,7 @@
 
 namespace ricochet {
 
+/// Method by which a stage is solved.
 enum class StageMethod {
     automatic,    ///< cases for boxes of up to four reactions, else Newton's method
     cases,        ///< Newton's method on f alone, the inequality solved exactly by cases
@@ -10,6 +11,7 @@ enum class StageMethod {
     fixed_point,  ///< projected fixed point with an adapted step, as in the source
 };
 
+/// How the stages of implicit steps are solved.
 struct StageOptions {
     StageMethod method = StageMethod::automatic;
     double tolerance = 1e-12;  ///< of the residual

@@ -6,6 +6,7 @@
 
 namespace ricochet {
 
+/// Reason for which a derivative does not exist.
 enum class Undefined : std::uint8_t {
     no,                ///< it exists
     grazing,           ///< the guard's rate vanishes: neighbouring motions miss the surface

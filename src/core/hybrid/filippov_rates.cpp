@@ -46,7 +46,7 @@ struct Bilinear {
     const double sum = -0.5 * (c1 + std::copysign(root, c1));
 
     bool found = false;
-    // Where a pair has vanished, both have their real part.
+    // Where the pair of zeros has become complex, both are taken at their real part.
     const double other = discriminant < 0 ? sum / c2 : c0 / sum;
     for (const double first : {sum / c2, other}) {
         const double by_p = p.p2 + p.p3 * first;

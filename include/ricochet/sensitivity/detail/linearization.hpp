@@ -431,7 +431,7 @@ public:
         differentiate_into(df, around.stencil, around.h, flow_at);
     }
 
-    /// The flow at states of any scalar, which it takes.
+    /// The flow at a state of any scalar, for systems whose flow is a template over its scalar.
     template <class S, class Xs>
     void flow_of(Mode mode, const S& t, const Xs& x, Xs& f) const
     {

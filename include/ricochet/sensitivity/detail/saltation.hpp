@@ -192,10 +192,11 @@ public:
         return undefined;
     }
 
-    /// Whether the events of one time, by which `before` became `after`, have put a guard on its
-    /// surface, and some neighbouring motions beside it, where it makes a difference: where they
-    /// then cross the surface, or where the guard came from before it, so that they are carried
-    /// across, or where the guard stays there.
+    /// Whether the events of one time, which turned `before` into `after`, have put a guard with a
+    /// reset on its surface, but not all neighbouring motions, where this makes a difference. It
+    /// does if the guard then crosses its surface in a direction that counts, if it was on the side
+    /// from which crossing counts, so that the events carry neighbouring motions across, or if it
+    /// stays on the surface and was not there before.
     [[nodiscard]] bool leaves_surface(const Motion<X>& before, const Motion<X>& after,
                                       const LastEvent& last) const
     {

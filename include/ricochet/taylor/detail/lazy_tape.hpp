@@ -131,7 +131,8 @@ private:
 
     Tape tape_;
     std::vector<double> constants_;
-    /// Of every sum, from which its operations follow if it is a combination.
+    /// Operands, with their factors, of every linear combination that is more than a sum or
+    /// difference of two operations; empty for all others.
     std::vector<std::vector<Term>> terms_;
     std::vector<bool> absorbed_;        ///< operations that are parts of combinations
     std::vector<std::size_t> places_;   ///< of operations in a row
