@@ -8,8 +8,8 @@
 namespace {
 
 struct LightGate {
-    using State = std::array<double, 6>;
-    static constexpr bool resets = false;  ///< position [m], velocity [m/s]
+    using State = std::array<double, 6>;  ///< position [m], velocity [m/s]
+    static constexpr bool resets = false;
     static constexpr ricochet::Crossing crossing = ricochet::Crossing::either;
 
     void flow(double /*t*/, const State& x, State& dxdt) const
