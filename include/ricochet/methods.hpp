@@ -197,7 +197,7 @@ template <class Stepper>
 
 }  // namespace detail
 
-/// As programs and messages spell it, such as "cash-karp54".
+/// Spells the method as programs and messages do, such as "cash-karp54".
 [[nodiscard]] constexpr std::string_view name(MethodName method) noexcept
 {
     return detail::named_methods[static_cast<std::size_t>(method)].spelled;
