@@ -92,6 +92,7 @@ inline void expect_times(const std::vector<double>& found, const std::vector<dou
 /// A body that two contacts hold at once, with bounds 1 and 3, under the load t.
 struct TwoContacts {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
 
     struct Motion {
         static constexpr int state_size = 1, reaction_size = 2;

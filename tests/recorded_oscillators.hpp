@@ -21,6 +21,7 @@ namespace ricochet::test {
 class Oscillators {
 public:
     using State = std::vector<double>;
+    static constexpr bool resets = false;
 
     explicit Oscillators(std::size_t n) : squares_(n)
     {

@@ -26,6 +26,7 @@ namespace ricochet {
 class HenonHeiles {
 public:
     using State = std::array<double, 4>;
+    static constexpr bool resets = false;
 
     static constexpr std::string_view name = "henon-heiles";
     static constexpr State start{-0.2525875586263492, -0.2178423952983717, 0, 0.2587703282931232};

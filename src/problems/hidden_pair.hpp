@@ -23,6 +23,7 @@ namespace ricochet {
 class HiddenPair {
 public:
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
 
     static constexpr std::string_view name = "hidden-pair";
     static constexpr double t_start = -8;  ///< [s]

@@ -39,6 +39,7 @@ namespace ricochet {
 class LeastEigenvalue {
 public:
     using State = std::array<double, 4>;
+    static constexpr bool resets = false;
     static constexpr std::size_t order = 24;
 
     struct Parameters {

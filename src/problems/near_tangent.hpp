@@ -28,6 +28,7 @@ namespace ricochet {
 class NearTangent {
 public:
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
 
     struct Parameters {
         double depth = 1e-4;  ///< of the level below the crest, in (-inf, 2)

@@ -31,6 +31,7 @@ namespace ricochet {
 class ThreeBody {
 public:
     using State = std::array<double, 4>;
+    static constexpr bool resets = false;
 
     struct Parameters {
         double mass_ratio = 1 / 82.45;  ///< Moon over both, in (0, 1/2]

@@ -35,6 +35,7 @@ namespace ricochet {
 class Zones {
 public:
     using State = std::array<double, 4>;
+    static constexpr bool resets = false;
 
     struct Parameters {
         std::size_t count = 256;  ///< of zones, positive

@@ -313,6 +313,7 @@ TEST(Reactions, OfASimulationAreThoseAfterItsLastStep)
 /// The contacts, and beside them a height that crosses a section at 2.3, inside a step.
 struct ContactsAndSection {
     using State = Two;
+    static constexpr bool resets = false;
     struct Motion {
         static constexpr int state_size = 2, reaction_size = 2;
         static void smooth(double t, const Eigen::Vector2d&, Eigen::Vector2d& f) { f << t, 1; }

@@ -135,6 +135,7 @@ struct SliderCase {
 class RateStateSlider {
 public:
     using State = std::array<double, 3>;
+    static constexpr bool resets = false;
 
     /// @throws std::invalid_argument if a parameter is outside its range, or the threshold
     /// [m/s] is not positive.

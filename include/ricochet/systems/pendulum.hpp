@@ -28,6 +28,7 @@ namespace ricochet {
 class Pendulum {
 public:
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
 
     struct Parameters {
         double gravity = 9.8;  ///< [m/s²], positive

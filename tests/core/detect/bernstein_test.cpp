@@ -785,6 +785,7 @@ TEST(Bernstein, WhereTheGuardIsNotANumberNothingIsCheckedOnlyAssumed)
 /// A spiral whose coordinates are zero in turn, four times in a turn.
 struct Spiral {
     using State = std::array<double, 2>;
+    static constexpr bool resets = false;
     double decay = 0;
     void flow(double, const State& x, State& dxdt) const
     {

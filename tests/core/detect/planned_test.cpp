@@ -957,6 +957,7 @@ TEST(Planned, MethodsThatMakeASeriesHaveTheEventsOfTheExactDetector)
 /// A stiff component that is kicked away from what it follows, and slow ones with guards.
 struct Kicked {
     using State = X;
+    static constexpr bool resets = false;
     static constexpr std::size_t guard_count = 3;
     double stiffness = 1000;  ///< [1/s]
     double period = 0.7;      ///< [s]

@@ -62,6 +62,7 @@ TEST(ResolvedGuards, WithoutTheCheckInsideMostAreLost)
 /// A state that stands still, and a guard of the time alone.
 template <double (*value)(double t, double parameter)>
 struct StillState {
+    static constexpr bool resets = false;
     double parameter = 0;
     void flow(double, const X1&, X1& dxdt) const { dxdt = {0}; }
     [[nodiscard]] double guard(double t, const X1&) const { return value(t, parameter); }
@@ -189,6 +190,7 @@ struct FourCrossings {
 
 /// A guard of the given size, which a swinging state crosses, or with a lead does not.
 struct Sized {
+    static constexpr bool resets = false;
     double unit = 1;
     double lead = 0;
     using State = std::array<double, 2>;
@@ -340,6 +342,7 @@ TEST(ResolvedGuards, AGuardThatIsNotFiniteEndsTheRunWhateverItsSign)
 
 /// The time or a number that grows like it, and whether it is outside of a window.
 struct Window {
+    static constexpr bool resets = false;
     double from = 0;
     double rate = 1;  ///< of the state; 0: only the time moves
     void flow(double, const X1&, X1& dxdt) const { dxdt = {rate}; }

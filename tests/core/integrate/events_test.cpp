@@ -773,6 +773,7 @@ TEST(Events, ABooleanGuardIsBisected)
 TEST(Events, AGuardOfIntegersIsANumber)
 {
     struct Inside {
+        static constexpr bool resets = false;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] int guard(double, const X1& x) const { return x[0] * x[0] < 2 ? 1 : -1; }
     };

@@ -1016,6 +1016,7 @@ TEST(Meaning, ARelayOfAGuardWithEitherIsCountedAndNamed)
 /// A parabola that touches its surface at t = 1 and crosses it where it is shifted down.
 struct Vetoed {
     using State = Array<1>;
+    static constexpr bool resets = false;
     double until = 2;
 
     void flow(double t, const State&, State& dxdt) const { dxdt[0] = 2 * (t - 1); }

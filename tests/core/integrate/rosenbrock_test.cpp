@@ -440,6 +440,7 @@ TEST(Rosenbrock, RunsBackward)
 
 /// Heat along a rod: stiffer with every component.
 struct Rod {
+    static constexpr bool resets = false;
     template <class X>
     void flow(const ScalarOf<X>&, const X& x, X& dxdt) const
     {

@@ -557,6 +557,7 @@ TEST(AtEntry, AComparatorBeyondItsLimitWhereItsModeBeginsFires)
 /// x' = -x with a guard x - 1/e.
 struct Decay {
     using State = std::array<double, 1>;
+    static constexpr bool resets = false;
     GuardInfo info{.resets = false};
     void flow(double, const State& x, State& dxdt) const { dxdt = {-x[0]}; }
     [[nodiscard]] double guard(double, const State& x) const { return x[0] - 1 / e; }
