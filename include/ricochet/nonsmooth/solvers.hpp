@@ -61,6 +61,9 @@ AnyStep<N, M>::AnyStep(const AnyInclusion<N, M>& inclusion, const SchemeOptions&
     }
     scratch_.inequality.dependent =
         box && matrices_.own_reactions() > 1 && has_dependent_reactions(matrices_);
+    if (!box && matrices_.own_reactions() > 1 && has_dependent_reactions(matrices_)) {
+        newton_.take_as_dependent();
+    }
     const Eigen::Index n = matrices_.size();
     for (Vector* v : {&f_, &stage_.q}) v->setZero(n);
     middle_.w.setZero(n);

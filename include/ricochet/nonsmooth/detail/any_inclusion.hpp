@@ -392,7 +392,7 @@ private:
 template <int N, int M>
 [[nodiscard]] Eigen::Matrix<double, M, 1> minimal_selection(
     const detail::AnyMatrices<N, M>& m, double t,
-    const std::type_identity_t<Eigen::Matrix<double, N, 1>>& w);
+    const std::type_identity_t<Eigen::Matrix<double, N, 1>>& w, double span = 0);
 
 /// How far a state and its reaction violate their law; see law.hpp.
 template <int N, int M>

@@ -361,7 +361,7 @@ protected:
     [[nodiscard]] bool select(State& at) const
     {
         try {
-            at.reaction = minimal_selection(matrices(), at.t, at.w);
+            at.reaction = minimal_selection(matrices(), at.t, at.w, options_.step);
         } catch (const InclusionRefused&) {
             return false;
         }
@@ -375,8 +375,10 @@ protected:
         constexpr double ulps = 8 * std::numeric_limits<double>::epsilon();
         if (!(std::abs(t - to_.t) <= ulps * std::abs(t))) return false;
         for (std::size_t i = 0; i < size(); ++i) {
+            // The loop has added the change over the step to the state before it.
             const double there = to_.w[index(i)];
-            if (!(std::abs(x[i] - there) <= ulps * std::abs(there))) return false;
+            const double terms = std::abs(there) + std::abs(from_is_to_.w[index(i)]);
+            if (!(std::abs(x[i] - there) <= ulps * terms)) return false;
         }
         return true;
     }

@@ -20,12 +20,13 @@
         declare(4, 2, __VA_ARGS__) declare(8, 4, __VA_ARGS__)
 
 /// Set-valued steps.
-#define RICOCHET_SET_VALUED_OF(N, M)                                        \
-    template class ricochet::detail::AnyMatrices<N, M>;                     \
-    template class ricochet::detail::AnyStep<N, M>;                         \
-    template class ricochet::detail::AnyMotion<N, M>;                       \
-    template Eigen::Matrix<double, M, 1> ricochet::minimal_selection<N, M>( \
-        const ricochet::detail::AnyMatrices<N, M>&, double, const Eigen::Matrix<double, N, 1>&);
+#define RICOCHET_SET_VALUED_OF(N, M)                                                            \
+    template class ricochet::detail::AnyMatrices<N, M>;                                         \
+    template class ricochet::detail::AnyStep<N, M>;                                             \
+    template class ricochet::detail::AnyMotion<N, M>;                                           \
+    template Eigen::Matrix<double, M, 1> ricochet::minimal_selection<N, M>(                     \
+        const ricochet::detail::AnyMatrices<N, M>&, double, const Eigen::Matrix<double, N, 1>&, \
+        double);
 
 /// The phases of a run.
 #define RICOCHET_HAND_OVER_OF(N, M)                                                            \

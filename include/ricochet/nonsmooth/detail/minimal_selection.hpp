@@ -170,12 +170,14 @@ struct RICOCHET_ALIGNED SelectionStart {
         return reaction;
     }
 
-    /// The reaction in any convex set: a nonzero y outweighs any y'.
-    [[nodiscard]] Reaction in_set()
+    /// The reaction in any convex set: a nonzero y outweighs any y'. A y counts as zero below the
+    /// rounding of its terms and of the change that the forces cause in `span` [s].
+    [[nodiscard]] Reaction in_set(double span)
     {
         Reaction reaction;
         reaction.setZero(m.reactions());
         double smallest = std::numeric_limits<double>::infinity();
+        size += span * rate.cwiseAbs();
         for (Eigen::Index i = 0; i < y.size(); ++i) {
             if (std::abs(y[i]) <= rounding(i)) y[i] = 0;
             if (y[i] != 0) smallest = std::min(smallest, std::abs(y[i]));
@@ -232,18 +234,19 @@ struct RICOCHET_ALIGNED SelectionStart {
 ///
 /// For a set of states that is no box, or of more than four components, zero.
 ///
+/// @param span  [s] as in `SelectionStart::in_set`, for sets that are no boxes
 /// @throws std::invalid_argument where the set is empty, where w lies outside a set of
 /// states, or where the reaction would have to be infinite (inside an obstacle).
 template <int N, int M>
 [[nodiscard]] Eigen::Matrix<double, M, 1> minimal_selection(
     const detail::AnyMatrices<N, M>& m, double t,
-    const std::type_identity_t<Eigen::Matrix<double, N, 1>>& w)
+    const std::type_identity_t<Eigen::Matrix<double, N, 1>>& w, double span)
 {
     detail::SelectionStart<N, M> start(m, t, w);
     if (m.traits().box && (m.reactions() <= most_cases || detail::has_dependent_reactions(m))) {
         return start.in_box();
     }
-    if (m.traits().of_reactions()) return start.in_set();
+    if (m.traits().of_reactions()) return start.in_set(span);
     return detail::SelectionStart<N, M>::Reaction::Zero(m.reactions());
 }
 

@@ -10,8 +10,8 @@ namespace ricochet::detail {
 
 /// Equation and law of a stage as one system in x = (w, reaction):
 ///
-///     (c A w - kappa f - sigma G reaction - q) / scale
-///     sigma (reaction - P(reaction - rho y)) / scale
+///     (c A w - kappa f - sigma G reaction - q) / scale of the row
+///     sigma (reaction - P(reaction - rho y)) / scale of the law
 ///
 /// with the derivative of a bound by the state where the system declares it. Without it the
 /// bound is treated as constant, and the iteration converges linearly.
@@ -32,10 +32,16 @@ public:
         v_.setZero(n + k, n + k);
         slope_.setZero(k, k);
         gradient_.setZero(n);
+        scale_.setOnes(n);
+        unscaled_ = x_;
         scratch_.f = scratch_.direction = scratch_.trial = scratch_.f_trial = x_;
         w_.setZero(n);
         reaction_.setZero(k);
     }
+
+    /// Lets Newton's equations, which are singular where dependent reactions hold their y, have the
+    /// least changes of reactions.
+    void take_as_dependent() noexcept { dependent_ = true; }
 
     [[nodiscard]] StageReport solve(StageScratch<N, M>& scratch, const Stage<N, M>& stage,
                                     const StageOptions& options, State& w, Reaction& reaction)
@@ -47,15 +53,14 @@ public:
         const auto& factor = scratch.factor(stage, w);
         scratch.set_rho(factor);
         m.smooth(stage.t, w, scratch.f);
-        scale_ = std::max({(stage.c * times(m.mass(), w)).template lpNorm<Eigen::Infinity>(),
-                           stage.kappa * scratch.f.template lpNorm<Eigen::Infinity>(),
-                           stage.q.template lpNorm<Eigen::Infinity>(),
-                           std::numeric_limits<double>::min()});
+        set_scales(scratch, stage, w, reaction, options.tolerance);
         x_.head(w.size()) = w;
         x_.tail(reaction.size()) = reaction;
-        // Below the tolerance, since the scale here is that of the starting point.
+        // Below the tolerance, since the scale here is that of the starting point; reactions that
+        // depend on one another leave a y that is not exactly zero while they hold it.
+        const double tolerance = options.tolerance * (dependent_ ? 1e-3 : 0.25);
         const NewtonReport newton = semismooth_newton(*this, x_,
-                                                      {.tolerance = options.tolerance / 4,
+                                                      {.tolerance = tolerance,
                                                        .max_iterations = options.max_iterations,
                                                        .line_search = options.line_search},
                                                       scratch_);
@@ -64,6 +69,7 @@ public:
         m.smooth(stage.t, w, scratch.f);
         StageReport report = scratch.residual(stage, w, scratch.f, reaction);
         report.iterations = newton.iterations;
+        if (!scratch.traits.box) report.residual = newton.residual;
         report.converged = report.residual <= options.tolerance;
         return report;
     }
@@ -74,8 +80,8 @@ public:
         take_apart(x);
         s.m.smooth(stage_->t, w_, s.f_trial);
         (void)s.residual(*stage_, w_, s.f_trial, reaction_);
-        f.head(w_.size()) = s.defect / scale_;
-        f.tail(reaction_.size()) = (stage_->sigma / scale_) * s.image;
+        f.head(w_.size()) = s.defect.cwiseQuotient(scale_);
+        f.tail(reaction_.size()) = (stage_->sigma / law_scale_) * s.image;
     }
 
     [[nodiscard]] bool direction(const Vector& x, const Vector& f, Vector& d)
@@ -107,17 +113,48 @@ public:
                 v_.row(n + i).head(n) += factor * s.m.observe().row(j);
             }
             if (s.traits.gives_bound_gradient && s.traits.box) add_bound_gradient(i, s);
+            // Changes of reactions that depend on one another are then the least ones.
+            if (dependent_) v_(n + i, n + i) += 1e-9;
             v_.row(n + i) *= stage_->sigma;
         }
         s.factors[0].valid = false;
         // Undamped directions at kinks can be singular, which would stall the search.
-        return dense_direction(v_, lu_, Vector(f * scale_), d);
+        unscaled_.head(n) = f.head(n).cwiseProduct(scale_);
+        unscaled_.tail(k) = f.tail(k) * law_scale_;
+        return dense_direction(v_, lu_, unscaled_, d);
     }
 
     /// The generalised Jacobian of the last direction, for tests.
     [[nodiscard]] const Matrix& jacobian() const noexcept { return v_; }
 
 private:
+    /// Scales of the equation, by rows, and of the law. For a box all of them are the largest term
+    /// of the equation. For other sets they are forces, or what the rounding of y leaves of the
+    /// tolerance: inertia in a short step exceeds these by far, and beside it no error of a
+    /// reaction would show.
+    void set_scales(const StageScratch<N, M>& scratch, const Stage<N, M>& stage, const State& w,
+                    const Reaction& reaction, double tolerance)
+    {
+        const auto& m = scratch.m;
+        scale_ = (stage.c * times(m.mass(), w)).cwiseAbs().cwiseMax(stage.q.cwiseAbs());
+        double force = std::max(stage.kappa * scratch.f.template lpNorm<Eigen::Infinity>(),
+                                std::numeric_limits<double>::min());
+        if (scratch.traits.box) {
+            law_scale_ = std::max(scale_.template lpNorm<Eigen::Infinity>(), force);
+            scale_.setConstant(law_scale_);
+            return;
+        }
+        const State of_reactions =
+            stage.sigma * times(m.act().cwiseAbs(), Reaction(reaction.cwiseAbs()));
+        force = std::max(force, of_reactions.template lpNorm<Eigen::Infinity>());
+        scale_ = scale_.cwiseMax(force);
+        const Reaction terms = times(m.observe().cwiseAbs(), State(w.cwiseAbs()));
+        const double of_y = (scratch.rho.cwiseProduct(terms + scratch.s.cwiseAbs())).maxCoeff();
+        const double rounding = 64 * std::numeric_limits<double>::epsilon() * of_y;
+        const double lever = m.act().cwiseAbs().maxCoeff();
+        law_scale_ = std::max(lever > 0 ? force / lever : force, rounding / tolerance);
+    }
+
     void take_apart(const Vector& x)
     {
         w_ = x.head(w_.size());
@@ -136,8 +173,10 @@ private:
 
     StageScratch<N, M>* scratch_of_stage_ = nullptr;
     const Stage<N, M>* stage_ = nullptr;
-    double scale_ = 1;
-    Vector x_;
+    State scale_;           // of the rows of the equation
+    double law_scale_ = 1;  // of the rows of the law
+    bool dependent_ = false;
+    Vector x_, unscaled_;
     Matrix v_;
     Eigen::PartialPivLU<Matrix> lu_;
     Eigen::Matrix<double, M, M> slope_;
