@@ -61,7 +61,7 @@ Json settings_json(const SystemEntry& system, const RunSettings& settings, bool 
     const Options& o = settings.options;
     Json out{{"t_start", o.t_start},
              {"t_end", o.t_end},
-             {"stepper", name(settings.stepper)},
+             {"stepper", settings.stepper.name()},
              {"step", o.step},
              {"rtol", o.rtol},
              {"atol", o.atol},

@@ -76,7 +76,7 @@ template <class System, class Vector>
 [[nodiscard]] TimedRun step_in_time(const System& system, const Vector& q, const Vector& v,
                                     const RunSettings& settings)
 {
-    using Flight = detail::FreeFlight<System>;
+    using Flight = ricochet::detail::FreeFlight<System>;
     const Options& o = settings.options;
     TimeStepping<System> motion(
         system, q, v, {.t_start = o.t_start, .t_end = o.t_end, .step = settings.set_valued->step});
