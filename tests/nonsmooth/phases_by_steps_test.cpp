@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <boost/numeric/odeint/stepper/runge_kutta_cash_karp54.hpp>
 #include <cmath>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "phased_runs.hpp"
+#include "random_inclusions.hpp"
 #include "refusal.hpp"
 #include "ricochet/odeint.hpp"
 #include "ricochet/taylor/taylor.hpp"
@@ -80,6 +82,120 @@ TEST(PhasesBySteps, ABodyStopsOnAPlane)
     sampled.sample_times = {0.5};
     const auto half = integrate(Plane{}, Plane::State{0.54, 0.72, 1.125, 0}, sampled);
     EXPECT_NEAR(half.trajectory.x[0][0], 0.6 * 0.425, of_steps);
+}
+
+/// The body of `Plane` on two discs, of friction 3/4 and 1/4, with `load` times its pull.
+struct TwoDiscs {
+    using State = Plane::State;
+    struct Motion {
+        static constexpr int state_size = 4, reaction_size = 4;
+        double load;
+        void smooth(double t, const Eigen::Vector4d& w, Eigen::Vector4d& f) const
+        {
+            f << load * 0.6 * t / 5, load * 0.8 * t / 5, w[3], -1;
+        }
+        [[nodiscard]] static auto reaction_set(double, const Eigen::Vector4d&)
+        {
+            return sets::Product(sets::Ball<2>(0.75), sets::Ball<2>(0.25));
+        }
+        static void observe(Eigen::Matrix4d& e)
+        {
+            e.setZero();
+            e(0, 0) = e(1, 1) = e(2, 0) = e(3, 1) = 1;
+        }
+    };
+
+    double load;
+
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        const double speed = std::hypot(x[0], x[1]), pull = load * t / 5;
+        dxdt = {0.6 * pull - x[0] / speed, 0.8 * pull - x[1] / speed, x[3], -1};
+    }
+    [[nodiscard]] static double guard(double, const State& x) { return x[2]; }
+    [[nodiscard]] static GuardInfo guard_info() { return bounding(); }
+    static void reset(double, State& x) { x[3] = -x[3]; }
+    [[nodiscard]] Motion set_valued() const { return {load}; }
+};
+
+/// Speed at 6 of the body from 0.9: v' = load t/5 - 1 until it stops, and again from 5 / load.
+[[nodiscard]] double speed_at_6(double load)
+{
+    const double slip = 5 / load;
+    return slip < 6 ? load * (36 - slip * slip) / 10 - (6 - slip) : 0;
+}
+
+TEST(PhasesBySteps, ABodyOnTwoDiscsStopsAndSlipsAtAnyTolerance)
+{
+    for (const double rtol : {1e-4, 1e-6, 1e-8, 1e-9, 1e-10, 1e-11}) {
+        for (const double load : {0.0, 0.3, 1.0, 2.0}) {
+            const Options options{.t_end = 6, .rtol = rtol, .atol = rtol};
+            const auto run = integrate(TwoDiscs{load}, {0.54, 0.72, 1.125, 0}, options);
+            ASSERT_EQ(run.outcome, Outcome::reached_end)
+                << rtol << ' ' << load << ' ' << run.reason;
+            // Within the tolerance at each of the two changes, where a reaction jumps, and with
+            // steps of a thousandth of the run of order two beside them: (6e-3)^2 / 12.
+            const double speed = speed_at_6(load), error = 4 * std::min(rtol, 1e-6) + 1e-11;
+            EXPECT_NEAR(run.x[0], 0.6 * speed, error) << rtol << ' ' << load;
+            EXPECT_NEAR(run.x[1], 0.8 * speed, error) << rtol << ' ' << load;
+            EXPECT_LT(run.statistics.steps, 1100U) << rtol << ' ' << load;
+            expect_times(times_at(run.events, 0, EventKind::crossing), {1.5, 4.5});
+        }
+    }
+}
+
+TEST(PhasesBySteps, ABodyOnTwoDiscsGoesThroughSnapshots)
+{
+    const auto run = run_of(TwoDiscs{1}, TwoDiscs::State{0.54, 0.72, 1.125, 0}, until(6));
+    expect_end(run, TwoDiscs::State{0.06, 0.08, 1.125, 0}, of_steps);
+}
+
+/// Random pulls in random directions on one disc, beside a ball: a run to 1e-10 agrees with one to
+/// 1e-8 within the latter.
+TEST(PhasesBySteps, DiscsUnderRandomLoadsStopAtSmallTolerances)
+{
+    struct Pulled {
+        struct Motion {
+            static constexpr int state_size = 4, reaction_size = 2;
+            Eigen::Vector2d steady, growing;
+            void smooth(double t, const Eigen::Vector4d& w, Eigen::Vector4d& f) const
+            {
+                f << steady + t * growing, w[3], -1;
+            }
+            [[nodiscard]] static sets::Ball<2> reaction_set(double, const Eigen::Vector4d&)
+            {
+                return sets::Ball<2>(1);
+            }
+        };
+        using State = std::array<double, 4>;
+        Motion motion;
+        void flow(double t, const State& x, State& dxdt) const
+        {
+            const double speed = std::hypot(x[0], x[1]);
+            const Eigen::Vector2d pull = motion.steady + t * motion.growing;
+            dxdt = {pull[0] - x[0] / speed, pull[1] - x[1] / speed, x[3], -1};
+        }
+        [[nodiscard]] static double guard(double, const State& x) { return x[2]; }
+        [[nodiscard]] static GuardInfo guard_info() { return bounding(); }
+        static void reset(double, State& x) { x[3] = -x[3]; }
+        [[nodiscard]] Motion set_valued() const { return motion; }
+    };
+    test::Draw draw(5);
+    for (int k = 0; k < 40; ++k) {
+        Pulled system;
+        system.motion.steady = {draw.uniform(-0.5, 0.5), draw.uniform(-0.5, 0.5)};
+        system.motion.growing = {draw.uniform(-0.2, 0.2), draw.uniform(-0.2, 0.2)};
+        const Pulled::State from{draw.uniform(-1, 1), draw.uniform(-1, 1), 1.125, 0};
+        Pulled::State coarse{};
+        for (const double rtol : {1e-8, 1e-10}) {
+            const auto run = integrate(system, from, {.t_end = 6, .rtol = rtol, .atol = rtol});
+            ASSERT_EQ(run.outcome, Outcome::reached_end) << k << ' ' << rtol << ' ' << run.reason;
+            EXPECT_LT(run.statistics.steps, 2000U) << k << ' ' << rtol;
+            if (rtol == 1e-8) coarse = run.x;
+            // A hundred steps may spend their tolerance in one direction.
+            for (int i = 0; i < 2; ++i) EXPECT_NEAR(run.x[i], coarse[i], 1e-6) << k;
+        }
+    }
 }
 
 TEST(PhasesBySteps, ARunStopsAtAnEventBesideASetWithoutBranches)

@@ -297,6 +297,7 @@ public:
         memory.push_back(to_.t);
         add(memory, to_.w);
         add(memory, to_.reaction);
+        add(memory, from_is_to_.w);
     }
     void restore(std::span<const double> memory) override
     {
@@ -304,6 +305,7 @@ public:
         std::size_t next = 1;
         read(memory, next, to_.w);
         read(memory, next, to_.reaction);
+        read(memory, next, from_is_to_.w);
         from_is_to_.t = std::numeric_limits<double>::quiet_NaN();
     }
 
