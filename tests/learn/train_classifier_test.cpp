@@ -164,7 +164,7 @@ TEST(TrainClassifier, RefusesWhatCannotBeTrained)
     training.states = 3;
     refused(training, "states");
     struct Quiet {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double, const X&, X& dxdt) const { dxdt = {0, 0}; }
         [[nodiscard]] double guard(double, const X& x) const { return 100 + x[0]; }
     };

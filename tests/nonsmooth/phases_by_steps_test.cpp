@@ -150,36 +150,38 @@ TEST(PhasesBySteps, ABodyOnTwoDiscsGoesThroughSnapshots)
     expect_end(run, TwoDiscs::State{0.06, 0.08, 1.125, 0}, of_steps);
 }
 
+/// A body on one disc of friction 1, and the ball of `Plane` beside it.
+struct Pulled {
+    struct Motion {
+        static constexpr int state_size = 4, reaction_size = 2;
+        Eigen::Vector2d steady, growing;
+        void smooth(double t, const Eigen::Vector4d& w, Eigen::Vector4d& f) const
+        {
+            f << steady + t * growing, w[3], -1;
+        }
+        [[nodiscard]] static sets::Ball<2> reaction_set(double, const Eigen::Vector4d&)
+        {
+            return sets::Ball<2>(1);
+        }
+    };
+    using State = std::array<double, 4>;
+    Motion motion;
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        const double speed = std::hypot(x[0], x[1]);
+        const Eigen::Vector2d pull = motion.steady + t * motion.growing;
+        dxdt = {pull[0] - x[0] / speed, pull[1] - x[1] / speed, x[3], -1};
+    }
+    [[nodiscard]] static double guard(double, const State& x) { return x[2]; }
+    [[nodiscard]] static GuardInfo guard_info() { return bounding(); }
+    static void reset(double, State& x) { x[3] = -x[3]; }
+    [[nodiscard]] Motion set_valued() const { return motion; }
+};
+
 /// Random pulls in random directions on one disc, beside a ball: a run to 1e-10 agrees with one to
 /// 1e-8 within the latter.
 TEST(PhasesBySteps, DiscsUnderRandomLoadsStopAtSmallTolerances)
 {
-    struct Pulled {
-        struct Motion {
-            static constexpr int state_size = 4, reaction_size = 2;
-            Eigen::Vector2d steady, growing;
-            void smooth(double t, const Eigen::Vector4d& w, Eigen::Vector4d& f) const
-            {
-                f << steady + t * growing, w[3], -1;
-            }
-            [[nodiscard]] static sets::Ball<2> reaction_set(double, const Eigen::Vector4d&)
-            {
-                return sets::Ball<2>(1);
-            }
-        };
-        using State = std::array<double, 4>;
-        Motion motion;
-        void flow(double t, const State& x, State& dxdt) const
-        {
-            const double speed = std::hypot(x[0], x[1]);
-            const Eigen::Vector2d pull = motion.steady + t * motion.growing;
-            dxdt = {pull[0] - x[0] / speed, pull[1] - x[1] / speed, x[3], -1};
-        }
-        [[nodiscard]] static double guard(double, const State& x) { return x[2]; }
-        [[nodiscard]] static GuardInfo guard_info() { return bounding(); }
-        static void reset(double, State& x) { x[3] = -x[3]; }
-        [[nodiscard]] Motion set_valued() const { return motion; }
-    };
     test::Draw draw(5);
     for (int k = 0; k < 40; ++k) {
         Pulled system;

@@ -519,12 +519,27 @@ template <class System, class X>
     return value_declaration<Name_unilateral, System, fits>();
 }
 
-/// The system says that its events change nothing: they are recorded, or end the run.
+/// Whether the system says that its events change nothing: they are recorded, or end the run. A
+/// class inside a function, which has no static data, says so by a function.
 template <class System>
-concept SaysNoReset = requires
+[[nodiscard]] consteval bool says_no_reset() noexcept
 {
-    requires !System::resets;
-};
+    if constexpr (requires {
+                      {
+                          &System::resets
+                          } -> std::same_as<const bool*>;
+                  }) {
+        return !System::resets;
+    } else if constexpr (requires {
+                             {
+                                 &System::resets
+                                 } -> std::convertible_to<bool (*)()>;
+                         }) {
+        return !System::resets();
+    } else {
+        return false;
+    }
+}
 
 /// Rejects a system with set_valued() where its inclusion would be ignored.
 template <class System>
@@ -629,12 +644,12 @@ constexpr bool check_declarations()
                    "void time_reset(double t, State& x) const, or Mode time_reset(Mode, double t, "
                    "State& x) const, with a next_time_event or Times time_events")
 #undef RICOCHET_CHECK
-    constexpr bool has_reset = reset_declaration<System, X>() != Declaration::absent ||
-                               is_hidden<Name_reset, System, X>();
-    static_assert(!checks_names || !Guarded<System, X> || has_reset || SaysNoReset<System>,
+    constexpr bool has_reset =
+        reset_declaration<System, X>() != Declaration::absent || is_hidden<Name_reset, System, X>();
+    static_assert(!checks_names || !Guarded<System, X> || has_reset || says_no_reset<System>(),
                   "ricochet: found a guard and no reset; expected a reset of that name or, where "
                   "events are only recorded or end the run, static constexpr bool resets = false");
-    static_assert(!has_reset || !SaysNoReset<System>,
+    static_assert(!has_reset || !says_no_reset<System>(),
                   "ricochet: found a reset beside resets = false; expected one of the two");
     if constexpr (CountsGuards<System>) {
         static_assert(Guarded<System, X>,

@@ -185,7 +185,7 @@ TEST(Network, AModelForAnotherSystemIsRefused)
 
     struct Nameless {
         using State = std::array<double, 2>;
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double, const State& x, State& dxdt) const { dxdt = {x[1], -x[0]}; }
         [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
     };

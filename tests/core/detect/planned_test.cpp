@@ -475,7 +475,7 @@ TEST(Planned, LookingAheadSavesChecks)
     // When the point moves away from a wall at the full speed, two values cover any interval; one
     // covers a distance equal to that to the wall, which takes log2(1000) checks from 0.01 to 10.
     struct Leaving {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0, 0, 0}; }
         double guard(double, const X& x) const { return x[0]; }
         double speed_bound(double, const X&) const { return 1; }
@@ -1136,7 +1136,7 @@ TEST(Planned, ATimeEventAtTheEndAccusesNoBound)
 {
     // Its reset moves the guard by more than the bound of the flow allows.
     struct Moved {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double, const X& x, X& dxdt) const { dxdt = {x[2], 0, 0, 0}; }
         double guard(double, const X& x) const { return x[0]; }
         double speed_bound(double, const X&) const { return 1; }

@@ -583,7 +583,7 @@ TEST(HardEvents, APredicateHoldsForGuardsThatAResetFlips)
 TEST(HardEvents, AGuardThatIsNoNumberEndsTheRunOnAPlateauToo)
 {
     struct Broken {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const
         {
@@ -596,7 +596,7 @@ TEST(HardEvents, AGuardThatIsNoNumberEndsTheRunOnAPlateauToo)
 TEST(HardEvents, AGuardThatBecomesInfiniteHasNoEventThere)
 {
     struct Broken {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         double beyond;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const { return x[0] < 1.5 ? 1.2 : beyond; }
@@ -642,7 +642,7 @@ TEST(HardEvents, ASpoiltSnapshotIsRefusedAndChangesNothing)
 TEST(HardEvents, AdvanceStopsAtSamplesAndShowsTheLastEvent)
 {
     struct Clock {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const { return 1.2 - x[0]; }
     };
@@ -828,7 +828,7 @@ TEST(HardEvents, AStartThatTellsNoTimeScaleDoesNotTakeItFromTheEnd)
 {
     // At rest at the origin, under a force that grows with the time: x = t^3 / 6 meets 1.
     struct Pushed {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double t, const X& x, X& dxdt) const { dxdt = {x[1], t}; }
         [[nodiscard]] double guard(double, const X& x) const { return 1 - x[0]; }
     };

@@ -169,7 +169,7 @@ TEST(Events, ATouchIsReportedOnceWhereverTheStepsFall)
     // g = (t - 1/2)^2 is zero with zero rate at 1/2, which lies inside a step, at the
     // end of one, and a rounding away from it.
     struct Squared {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         Crossing crossing = Crossing::either;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const
@@ -224,7 +224,7 @@ TEST(Events, ADeclaredBandTurnsDipsOfLessThanItIntoTouches)
 TEST(Events, ATripleRootIsOneCrossing)
 {
     struct Cubed {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         Crossing crossing = Crossing::either;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const
@@ -577,7 +577,7 @@ TEST(Events, APlateauWaits)
 {
     // g = max(0, 1 - t) - max(0, t - 2): down to zero at 1, away below at 2.
     struct Plateau {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         Crossing crossing = Crossing::either;
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] double guard(double, const X1& x) const
@@ -773,7 +773,7 @@ TEST(Events, ABooleanGuardIsBisected)
 TEST(Events, AGuardOfIntegersIsANumber)
 {
     struct Inside {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double, const X1&, X1& dxdt) const { dxdt = {1}; }
         [[nodiscard]] int guard(double, const X1& x) const { return x[0] * x[0] < 2 ? 1 : -1; }
     };
@@ -1045,7 +1045,7 @@ TEST(Events, ContradictoryDeclarationsAreRefused)
     };
     EXPECT_THROW((void)integrate(Rising{}, X{1, 0}, {.t_end = 1}), std::invalid_argument);
     struct NoReset {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         bool unilateral = true;
         void flow(double, const X& x, X& dxdt) const { dxdt = {x[1], -1}; }
         [[nodiscard]] double guard(double, const X& x) const { return x[0]; }

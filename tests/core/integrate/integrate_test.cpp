@@ -483,7 +483,7 @@ TEST(Integrate, AGuardThatFailsEndsTheRun)
 {
     struct Blind {
         using State = X;
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
         [[nodiscard]] double guard(double t, const X&) const { return t < 0.5 ? 1.0 : nan; }
     };
@@ -526,7 +526,7 @@ TEST(Integrate, AResetBehindTheSurfaceIsReported)
 TEST(Integrate, APoleIsOneEventNotAThousand)
 {
     struct Pole {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         Crossing crossing = Crossing::either;
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
         [[nodiscard]] double guard(double t, const X&) const { return std::tan(t); }
@@ -542,7 +542,7 @@ TEST(Integrate, APoleIsOneEventNotAThousand)
 TEST(Integrate, EventsThatDoNotAdvanceTimeEndTheRun)
 {
     struct Plateau {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         Crossing crossing = Crossing::either;
         void flow(double, const X&, X& dxdt) const { dxdt = {1, 0}; }
         [[nodiscard]] double guard(double t, const X&) const
@@ -635,7 +635,7 @@ TEST(Integrate, AStartWithoutComponentsIsRefused)
 TEST(Integrate, AConstraintWithoutAResetIsRefused)
 {
     struct Wall {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         bool unilateral = true;
         void flow(double, const X&, X& dxdt) const { dxdt = {-1, 0}; }
         [[nodiscard]] double guard(double, const X& x) const { return x[0]; }

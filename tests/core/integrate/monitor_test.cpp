@@ -655,7 +655,7 @@ TEST(Monitor, AHostMayRunBackward)
 {
     // x = t^2 - 1, from t = 2 down: above its surface until t = 1, and again from t = -1 on.
     struct Parabola {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double t, const X1&, X1& dxdt) const { dxdt = {2 * t}; }
         [[nodiscard]] double guard(double, const X1& x) const { return x[0]; }
     };
@@ -1106,7 +1106,7 @@ TEST(MonitorRefusals, StartsAndArraysThatAreNone)
 TEST(MonitorRefusals, AGuardThatIsNoNumberEndsTheRun)
 {
     struct Root {
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         void flow(double, const X1&, X1& dxdt) const { dxdt = {-1}; }
         [[nodiscard]] double guard(double, const X1& x) const { return std::sqrt(x[0]) + 1; }
     };

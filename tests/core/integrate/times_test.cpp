@@ -183,7 +183,7 @@ TEST(Lists, ACrossingAtATimeThatIsListedTwiceIsOneEvent)
     // takes the guard to be as near to its surface as the first has found it.
     struct Line {
         using State = std::array<double, 1>;
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         double rate;
         GuardInfo info;
         Times time_events;
@@ -585,7 +585,7 @@ TEST(Endless, ARunThatNothingEndsStalls)
     // A guard that is never reached by a motion that stands still, or recedes.
     struct Receding {
         using State = std::array<double, 1>;
-        static constexpr bool resets = false;
+        static constexpr bool resets() { return false; }
         double rate = 0;
         void flow(double, const State&, State& dxdt) const { dxdt = {rate}; }
         [[nodiscard]] double guard(double, const State& x) const { return x[0]; }
