@@ -143,11 +143,6 @@ struct Renamed {
     void jump(double, X& x) const { x[1] = -x[1]; }
 };
 
-// CASE 2 alone: found a reset beside resets = false; expected one of the two
-struct Both : Falling {
-    static constexpr bool resets = false;
-};
-
 struct Swapped : Two {
 // CASE 33 alone: found a guard that takes the Mode before the number of the guard
 #if CASE == 33
@@ -246,8 +241,6 @@ int main()
     EventMonitor braced_monitor(falling, {10, 0});
 #elif CASE == 1
     (void)integrate(Renamed{}, x0, {.t_end = 1});
-#elif CASE == 2
-    EventMonitor monitor(Both{}, x0);
 #elif CASE >= 33 && CASE <= 40
     (void)integrate(Swapped{}, x0, {.t_end = 1});
 // CASE 41 alone: found a start with another number of components than System::State

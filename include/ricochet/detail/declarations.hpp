@@ -649,8 +649,6 @@ constexpr bool check_declarations()
     static_assert(!checks_names || !Guarded<System, X> || has_reset || says_no_reset<System>(),
                   "ricochet: found a guard and no reset; expected a reset of that name or, where "
                   "events are only recorded or end the run, static constexpr bool resets = false");
-    static_assert(!has_reset || !says_no_reset<System>(),
-                  "ricochet: found a reset beside resets = false; expected one of the two");
     if constexpr (CountsGuards<System>) {
         static_assert(Guarded<System, X>,
                       "ricochet: found guard_count, but neither guard(which, [mode,] t, x) nor "

@@ -33,10 +33,12 @@ struct Falling {
 };
 
 struct FallingOntoFloor : Falling {
+    static constexpr bool resets = false;
     double guard(double, const X& x) const { return x[0]; }
 };
 
 struct TwoFloors : Falling {
+    static constexpr bool resets = false;
     static constexpr std::size_t guard_count = 2;
     double guard(std::size_t which, double, const X& x) const { return x[which]; }
 };

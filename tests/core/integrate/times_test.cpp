@@ -273,6 +273,7 @@ TEST(Timers, OneThatLiesInThePastIsRefused)
 
 /// Spikes whose count ends the run at its second: more may be due at the same time.
 struct CountedSpikes : Spikes {
+    static constexpr bool resets = false;
     [[nodiscard]] double guard(double, const State& x) const { return 1.5 - x[0]; }
     [[nodiscard]] GuardInfo guard_info() const { return {.resets = false, .stop_after = 1}; }
 };
