@@ -202,6 +202,7 @@ struct Harmonic {
     }
 };
 struct FastClock : Harmonic {
+    static constexpr bool resets = false;
     template <class S>
     constexpr S guard(const S& t, const std::array<S, 2>& /*x*/) const
     {
@@ -210,6 +211,7 @@ struct FastClock : Harmonic {
     }
 };
 struct Corrugated : Harmonic {
+    static constexpr bool resets = false;
     template <class S>
     constexpr S guard(const S& /*t*/, const std::array<S, 2>& x) const
     {

@@ -133,6 +133,7 @@ TEST(ResolvedGuards, AGuardWhoseDomainEndsBeyondItsSurfaceHasItsEvent)
 /// Flows that end at surfaces elsewhere than at zero.
 template <double (*rate)(double t, double x), double (*surface)(double t)>
 struct EndsAt {
+    static constexpr bool resets = false;
     double sign = 1;
     void flow(double t, const X1& x, X1& dxdt) const { dxdt = {rate(t, x[0])}; }
     [[nodiscard]] double guard(double t, const X1& x) const { return sign * (x[0] - surface(t)); }

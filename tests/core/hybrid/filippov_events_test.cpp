@@ -267,6 +267,7 @@ struct Sections {
     using State = X2;
     static constexpr std::size_t surface_count = 1;
     static constexpr std::size_t guard_count = 2;
+    static constexpr bool resets = false;
     double vetoed_until = 0;
 
     [[nodiscard]] double surface(std::size_t, double, const X2& x) const { return x[1]; }

@@ -112,6 +112,7 @@ struct Spinning {
     }
 };
 struct CountedSpinning : Spinning {
+    static constexpr bool resets = false;
     [[nodiscard]] GuardInfo guard_info() const { return {.resets = false}; }
     [[nodiscard]] double guard(double, const std::array<double, 2>& x) const { return x[0]; }
 };
