@@ -14,6 +14,7 @@ namespace {
 
 /// q = (way along the track, height) [m].
 struct Part {
+    static constexpr bool resets = false;
     static constexpr int coordinates = 2;
     static constexpr int contacts = 1;
     static constexpr int tangents = 1;

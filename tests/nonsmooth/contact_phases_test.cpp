@@ -107,6 +107,7 @@ TEST(ContactPhases, TimeEventsActOnWhatLies)
 
 /// Body A lies on the floor, body B falls onto it beside A without restitution.
 struct Pair {
+    static constexpr bool resets = false;
     static constexpr int coordinates = 2;
     static constexpr int contacts = 2;
     static constexpr int tangents = 1;
