@@ -284,6 +284,7 @@ TEST(ContactPhases, RandomBarsStayOverTheFloorAndBetweenTheWallsAndGoOnFromSnaps
 
 /// Ends at half a metre.
 struct Ended : Puck {
+    static constexpr bool resets = false;
     static double guard(double, const State& x) { return 0.5 - x[0]; }
     static GuardInfo guard_info() { return {.stop_after = 1}; }
 };
