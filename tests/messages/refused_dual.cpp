@@ -20,6 +20,7 @@ using X = std::array<double, 2>;
 // CASE 7 alone: found a guard_derivative or reset_derivative that takes the Mode before
 struct Swinging {
     using State = X;
+    static constexpr bool resets = false;
 #if CASE == 4
     [[nodiscard]] static double moment(double angle)
     {

@@ -192,7 +192,7 @@ TEST(PhasesBySteps, DiscsUnderRandomLoadsStopAtSmallTolerances)
         for (const double rtol : {1e-8, 1e-10}) {
             const auto run = integrate(system, from, {.t_end = 6, .rtol = rtol, .atol = rtol});
             ASSERT_EQ(run.outcome, Outcome::reached_end) << k << ' ' << rtol << ' ' << run.reason;
-            EXPECT_LT(run.statistics.steps, 2000U) << k << ' ' << rtol;
+            EXPECT_LT(run.statistics.steps, 4000U) << k << ' ' << rtol;
             if (rtol == 1e-8) coarse = run.x;
             // A hundred steps may spend their tolerance in one direction.
             for (int i = 0; i < 2; ++i) EXPECT_NEAR(run.x[i], coarse[i], 1e-6) << k;

@@ -842,7 +842,7 @@ def test_members_of_another_form(members, words):
     ({"method": 3}, TypeError, "method: found 3, expected a text$"),
     ({"sample_times": [[1.0, 2.0]]}, ValueError, "sample_times: found 2 dimensions, expected 1"),
     ({"method": "rk4"}, ValueError, "method: found 'rk4', which has no error estimate, expected "
-                                    "fixed=True and a step beside it, or 'dopri5'"),
+                                    "fixed=True and a step beside it, or 'cash-karp54', 'dopri5'"),
     ({"method": "euler"}, ValueError, "method: found 'euler', which")])
 def test_options_of_integrate_that_are_none(options, error, words):
     for system in ricochet.System(decay), ricochet.BouncingBall():

@@ -644,8 +644,8 @@ constexpr bool check_declarations()
                    "void time_reset(double t, State& x) const, or Mode time_reset(Mode, double t, "
                    "State& x) const, with a next_time_event or Times time_events")
 #undef RICOCHET_CHECK
-    constexpr bool has_reset =
-        reset_declaration<System, X>() != Declaration::absent || is_hidden<Name_reset, System, X>();
+    constexpr bool has_reset = reset_declaration<System, X>() != Declaration::absent ||
+                               is_hidden<Name_reset, System, X>() || refuses_guards<System, X>();
     static_assert(!checks_names || !Guarded<System, X> || has_reset || says_no_reset<System>(),
                   "ricochet: found a guard and no reset; expected a reset of that name or, where "
                   "events are only recorded or end the run, static constexpr bool resets = false");

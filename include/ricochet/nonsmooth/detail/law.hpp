@@ -55,6 +55,14 @@ template <int N, int M>
     if (!m.traits().box) {
         if (!against(z)) return std::numeric_limits<double>::infinity();
         most = most.cwiseMax(z.cwiseAbs()).eval();
+        // Without forces only the set tells how large they may be, if it is bounded.
+        constexpr double far = 1e150;
+        const double length = y.template lpNorm<Eigen::Infinity>();
+        if (length > 0) z -= far * (y / length);
+        if (length > 0 && inclusion.project(t, w, z, z) &&
+            z.template lpNorm<Eigen::Infinity>() < 1e-3 * far) {
+            most = most.cwiseMax(z.cwiseAbs()).eval();
+        }
     }
     f = f.cwiseAbs().eval() + detail::times(m.act().cwiseAbs(), most);
     f = w.cwiseAbs() + span * detail::times(m.inverse_mass().cwiseAbs(), f).eval();

@@ -3,6 +3,10 @@
 // Stages by the semismooth Newton method, for sets of any shape.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include "ricochet/nonsmooth/detail/inclusion_stage.hpp"
 #include "ricochet/nonsmooth/semismooth_newton.hpp"
 
@@ -152,7 +156,14 @@ private:
         const double of_y = (scratch.rho.cwiseProduct(terms + scratch.s.cwiseAbs())).maxCoeff();
         const double rounding = 64 * std::numeric_limits<double>::epsilon() * of_y;
         const double lever = m.act().cwiseAbs().maxCoeff();
-        law_scale_ = std::max(lever > 0 ? force / lever : force, rounding / tolerance);
+        law_scale_ = below(std::max(lever > 0 ? force / lever : force, rounding / tolerance));
+        scale_ = scale_.unaryExpr(&below).eval();
+    }
+
+    /// The power of two next below x, by which numbers are divided without rounding.
+    [[nodiscard]] static double below(double x)
+    {
+        return std::isfinite(x) ? std::ldexp(1, std::ilogb(x)) : x;
     }
 
     void take_apart(const Vector& x)
