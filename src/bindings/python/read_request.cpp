@@ -26,8 +26,8 @@ namespace {
     if (name == "rk4") return MethodName::rk4;
     if (name == "euler") return MethodName::euler;
     throw py::value_error("found '" + name +
-                          "', expected 'dopri5', 'fehlberg78', 'taylor', 'cash-karp54', 'rk4' or "
-                          "'euler'");
+                          "', expected 'dopri5', 'fehlberg78', 'taylor', 'rosenbrock4', "
+                          "'cash-karp54', 'rk4' or 'euler'");
 }
 
 [[nodiscard]] std::string_view one_of(const std::string& name,
@@ -96,7 +96,8 @@ void set(Request& request, const py::handle& value)
          [](Request& request, const py::handle& value) {
              const auto name = read_as<std::string>(value);
              request.by_series = name == "taylor";
-             if (!request.by_series) request.method = method_named(name);
+             request.implicit = name == "rosenbrock4";
+             if (!request.by_series && !request.implicit) request.method = method_named(name);
          }},
         {"fixed",
          [](Request& request, const py::handle& value) { request.fixed = read_as<bool>(value); }},
@@ -168,7 +169,7 @@ Request request_from(const py::dict& given)
             throw py::value_error(std::string(name) + ": " + error.what());
         }
     }
-    if (!request.fixed && !request.by_series &&
+    if (!request.fixed && !request.by_series && !request.implicit &&
         (request.method == MethodName::rk4 || request.method == MethodName::euler)) {
         throw py::value_error(std::string("method: found '") +
                               (request.method == MethodName::rk4 ? "rk4" : "euler") +
