@@ -39,9 +39,10 @@ class CMakeBuild(build_ext):
         target = Path(self.get_ext_fullpath(extension.name)).resolve()
         target.parent.mkdir(parents=True, exist_ok=True)
         self.copy_file(str(module), str(target))
-        # Training, where CMAKE_ARGS asks for it.
-        for learn in (build / "python" / "ricochet").glob("_learn.*"):
-            self.copy_file(str(learn), str(target.parent / learn.name))
+        # Scenes, and training where CMAKE_ARGS asks for it.
+        for name in ("_scenes", "_learn"):
+            for further in (build / "python" / "ricochet").glob(f"{name}.*"):
+                self.copy_file(str(further), str(target.parent / further.name))
 
 
 setup(

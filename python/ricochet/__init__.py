@@ -8,8 +8,9 @@ floating-point numbers.
 """
 
 from . import _show  # noqa: F401
-from ._compiled import (C_FLOW, C_GUARD, C_RATE, C_RESET, Compiled)
+from ._compiled import C_FLOW, C_GUARD, C_JACOBIAN, C_RATE, C_RESET, Compiled
 from ._ensemble import Ensemble, ensemble, row_seed
+from ._filippov import Filippov
 from ._inclusion import Inclusion
 from ._ivp import solve_ivp
 from ._monitor import Cut, Monitor, Verdict
@@ -19,14 +20,15 @@ from ._ready import (BouncingBall, CoulombOscillator, ImpactOscillator, Pendulum
                      Thermostat)
 from ._ricochet import Run, Snapshot, Solution, Times, __version__
 from ._run import Kind, Simulation, integrate
+from ._scene import Scene, SceneKind, SceneRun
 from ._solution import OdeResult
 from ._system import Guard, Stop, System, every, guard
 from ._training import Certified, Trained, certify, train_classifier, train_gate
 
 __all__ = [
-    "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Certified", "Compiled",
-    "CoulombOscillator", "Cut", "Ensemble", "Guard", "ImpactOscillator", "Inclusion", "Kind", "Monitor", "Network", "OdeResult",
-    "Pendulum", "Run", "Simulation", "Snapshot", "Solution", "StickSlip", "Stop", "System", "Thermostat",
+    "BouncingBall", "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified", "Compiled",
+    "CoulombOscillator", "Cut", "Ensemble", "Filippov", "Guard", "ImpactOscillator", "Inclusion", "Kind", "Monitor", "Network", "OdeResult",
+    "Pendulum", "Run", "Scene", "SceneKind", "SceneRun", "Simulation", "Snapshot", "Solution", "StickSlip", "Stop", "System", "Thermostat",
     "Times", "Trained", "Verdict", "certify", "ensemble", "every", "guard", "integrate", "plot",
     "row_seed", "solve_ivp", "train_classifier", "train_gate",
 ]

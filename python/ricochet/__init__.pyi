@@ -11,6 +11,7 @@ __version__: str
 
 C_FLOW: str
 C_GUARD: str
+C_JACOBIAN: str
 C_RATE: str
 C_RESET: str
 
@@ -152,9 +153,21 @@ class System:
     changes_dimension: bool
     parameters: Optional[Mapping[str, float]]
     formula: Optional[int]
+    jacobian: Any
+    vector: str
     def __init__(self, flow: Optional[_Function] = None,
                  guards: Optional[Sequence[Any]] = None, **members: Any) -> None: ...
     def __init_subclass__(cls, unchecked_names: bool = False, **options: Any) -> None: ...
+
+class Filippov(System):
+    surfaces: Any
+    fields: Sequence[Any]
+    restoring_rate: float
+    def __init__(self, surfaces: Any = None, fields: Optional[Sequence[_Function]] = None,
+                 guards: Optional[Sequence[Any]] = None, *, restoring_rate: Optional[float] = None,
+                 **members: Any) -> None: ...
+    def start_mode(self, t: float, x: ArrayLike, tolerance: float = 0.0) -> str: ...
+    def shares(self, mode: str, t: float, x: ArrayLike) -> _Floats: ...
 
 class _Ready:
     modes: Optional[Tuple[str, ...]]
@@ -263,6 +276,65 @@ class Simulation:
     def ended(self) -> bool: ...
     @property
     def run(self) -> Run: ...
+
+class SceneKind(IntEnum):
+    IMPACT = 0
+    HELD = 1
+    STOPPED = 2
+    JOINED = 3
+    RELEASED = 4
+    SLEPT = 5
+
+class SceneRun:
+    outcome: str
+    message: str
+    success: bool
+    involved: list[int]
+    t: float
+    positions: _Floats
+    velocities: _Floats
+    asleep: NDArray[np.bool_]
+    times: _Floats
+    trajectory: _Floats
+    trajectory_velocities: _Floats
+    trajectory_asleep: NDArray[np.bool_]
+    energy: _Floats
+    energy_at_end: float
+    events: NDArray[np.void]
+    body_names: list[str]
+    surface_names: list[str]
+    statistics: SimpleNamespace
+    def __init__(self, scene: Any, found: dict[str, Any]) -> None: ...
+
+class Scene:
+    def __init__(self, gravity: ArrayLike = (0.0, 0.0), *, memory_limit: float = 4e9) -> None: ...
+    @classmethod
+    def from_json(cls, text: str, name: str = "scene") -> Scene: ...
+    @classmethod
+    def load(cls, path: Union[str, PathLike[str]]) -> Scene: ...
+    def material(self, name: str, *, restitution: float = 1.0, friction: float = 0.0) -> None: ...
+    def disc(self, at: ArrayLike, *, radius: float = 1.0, mass: float = 1.0,
+             velocity: ArrayLike = (0.0, 0.0), drag: float = 0.0, material: Optional[str] = None,
+             name: Optional[str] = None) -> int: ...
+    def point(self, at: ArrayLike, *, mass: float = 1.0, velocity: ArrayLike = (0.0, 0.0),
+              drag: float = 0.0, material: Optional[str] = None,
+              name: Optional[str] = None) -> int: ...
+    def wall(self, point: ArrayLike, normal: ArrayLike, *, material: Optional[str] = None,
+             motion: Optional[Mapping[str, Any]] = None, name: Optional[str] = None) -> int: ...
+    def terrain(self, points: ArrayLike, *, closed: bool = False, material: Optional[str] = None,
+                motion: Optional[Mapping[str, Any]] = None,
+                name: Optional[str] = None) -> int: ...
+    def spring(self, first: Union[int, str], second: Union[int, str], *, stiffness: float,
+               rest: float = 0.0, damping: float = 0.0) -> None: ...
+    @property
+    def body_names(self) -> list[str]: ...
+    @property
+    def surface_names(self) -> list[str]: ...
+    @property
+    def radii(self) -> _Floats: ...
+    def simulate(self, t_end: Optional[float] = None, **options: Any) -> SceneRun: ...
+    def explain(self, t_end: Optional[float] = None, **options: Any) -> str: ...
+    def energy(self, positions: ArrayLike, velocities: ArrayLike) -> _Floats: ...
 
 class Network:
     def __init__(self, path: Union[str, PathLike[str]]) -> None: ...
@@ -444,11 +516,12 @@ def solve_ivp(fun: Union[Callable[..., Any], Compiled, System, _Ready],
               t_span: Tuple[float, float], y0: ArrayLike, method: Any = "RK45",
               t_eval: Optional[ArrayLike] = None, dense_output: bool = False,
               events: Any = None, vectorized: bool = False, args: Optional[Sequence[Any]] = None, *,
-              set_valued: Optional[Inclusion] = None,
+              set_valued: Optional[Inclusion] = None, vector: str = "array",
               progress: Union[None, bool, Callable[[float, float], Any]] = None,
               rtol: ArrayLike = 1e-3, atol: ArrayLike = 1e-6, max_step: float = ...,
               first_step: Optional[float] = None, **options: Any) -> OdeResult: ...
 
 def plot(run: Any, components: Optional[Sequence[int]] = None, *,
          labels: Optional[Sequence[str]] = None, phase: Optional[Tuple[int, int]] = None,
-         events: bool = True, ax: Any = None) -> Any: ...
+         events: bool = True, modes: bool = True, unit: Optional[str] = None,
+         ax: Any = None) -> Any: ...

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ._compiled import Compiled
+from ._compiled import is_compiled
 from ._numbers import state_from
 from ._system import Stop
 
@@ -34,13 +34,28 @@ class _Coded:
 
     def flow(self, fun):
         """``fun`` for the core."""
-        if isinstance(fun, Compiled):
+        if is_compiled(fun):
             raise TypeError(f"fun: found a compiled function beside {self.what}, expected real "
                             "components")
 
         def flow(t, y, *further):
             return self.returned(fun(t, self.shown(y), *further), "fun")
         return flow
+
+    def jacobian(self, jac):
+        """``jac`` for the core."""
+        if is_compiled(jac):
+            raise TypeError(f"jac: found a compiled function beside {self.what}, expected one of "
+                            "Python")
+
+        def jacobian(t, y, *further):
+            found = jac(t, self.shown(y), *further)
+            found = np.asarray(found.toarray() if hasattr(found, "toarray") else found)
+            if found.shape != (self.components, self.components):
+                raise ValueError(f"jac returned the shape {found.shape}, expected an array of shape "
+                                 f"{(self.components, self.components)}")
+            return self.kept_matrix(found)
+        return jacobian
 
     def guard(self, specification):
         """The functions of a guard for the core."""
@@ -49,7 +64,7 @@ class _Coded:
             function = specification[name]
             if function is None:
                 continue
-            if isinstance(function, Compiled):
+            if is_compiled(function):
                 raise TypeError(f"{specification['title']}: found a compiled function beside "
                                 f"{self.what}, expected real components")
             if not callable(function):  # refused by the core
@@ -89,6 +104,14 @@ class Complex(_Coded):
     def kept(self, x):
         return np.ascontiguousarray(x, complex).view(float)
 
+    def kept_matrix(self, a):
+        """A product by complex numbers as one of pairs."""
+        out = np.empty((2 * len(a), 2 * len(a)))
+        out[0::2, 0::2] = out[1::2, 1::2] = a.real
+        out[1::2, 0::2] = a.imag
+        out[0::2, 1::2] = -a.imag
+        return out
+
     def tolerances(self, atol):
         """``atol`` of the core's components."""
         return np.repeat(atol, 2) if np.shape(atol) == (self.components,) else atol
@@ -104,6 +127,9 @@ class Empty(_Coded):
 
     def kept(self, x):
         return np.zeros(1)
+
+    def kept_matrix(self, a):
+        return np.zeros((1, 1))
 
     def tolerances(self, atol):
         return 1.0 if np.shape(atol) == (0,) else atol

@@ -8,20 +8,23 @@ import numpy as np
 
 from . import _progress, _ricochet
 from ._coded import Empty, coded
-from ._compiled import Compiled
+from ._compiled import C_FLOW, C_GUARD, C_JACOBIAN, Compiled, as_function, is_compiled
 from ._inclusion import specification_of
 from ._network import set_gate
 from ._ready import Ready
 from ._numbers import meant_by
-from ._run import (Kind, is_called_from_python, number_from, numbers_from, set_mode, set_tolerance,
-                   source_of)
+from ._run import (Kind, is_called_from_python, number_from, numbers_from, set_mode, set_start_mode,
+                   set_tolerance, source_of)
 from ._solution import new_result, new_solution
 from ._system import MOST_EVENTS, Guard, System
 
-_METHODS = {"RK45": "dopri5", "RK23": "dopri5", "DOP853": "fehlberg78", "Taylor": "taylor"}
+_METHODS = {"RK45": "dopri5", "RK23": "dopri5", "DOP853": "fehlberg78", "Taylor": "taylor",
+            **dict.fromkeys(("Radau", "BDF", "LSODA", "rosenbrock4"), "rosenbrock4")}
 #: Said at the end of a message, of methods that another one stands in for.
-_NOTES = {"RK23": " There is no method of order 3: 'RK23' was run as 'RK45'."}
-_IMPLICIT = ("Radau", "BDF", "LSODA")
+_NOTES = {"RK23": " There is no method of order 3: 'RK23' was run as 'RK45'.",
+          **{name: f" '{name}' was run as 'rosenbrock4', an implicit method of order 4."
+             for name in ("Radau", "BDF", "LSODA")}}
+#: Options of SciPy's implicit methods; all but the first and the last are about cost alone.
 _IMPLICIT_OPTIONS = ("jac", "jac_sparsity", "lband", "uband", "min_step")
 _KINDS = {kind.value: kind.name.lower() for kind in Kind}
 _EPS = np.finfo(float).eps
@@ -86,7 +89,8 @@ class _Constant:
 
 
 def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, events=None,
-              vectorized=False, args=None, *, set_valued=None, progress=None, **options):
+              vectorized=False, args=None, *, set_valued=None, vector="array", progress=None,
+              **options):
     """Solves y' = fun(t, y), y(t0) = y0, with events and resets.
 
     Arguments and result are those of ``scipy.integrate.solve_ivp``, and code that uses these runs
@@ -94,7 +98,9 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
 
     - ``method``: ``'RK45'`` (Dormand and Prince, as in SciPy) or ``'DOP853'``, which is replaced
       by Fehlberg's method of order 8; for ready systems and formulas also ``'Taylor'``. ``'RK23'``
-      is run as ``'RK45'``, which the message says; there are no implicit methods.
+      is run as ``'RK45'``, and ``'Radau'``, ``'BDF'``, ``'LSODA'`` as ``'rosenbrock4'``, an implicit
+      method of order 4 for up to a few dozen components, which the message says. It takes ``jac``
+      as SciPy does.
     - ``y0`` may be complex or empty, as in SciPy; `result.run` has complex components as pairs, and
       real and imaginary parts meet the tolerance by themselves.
     - ``fun`` may also be a `System`, whose guards then are the events.
@@ -113,6 +119,9 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
       where they hold something.
     - ``rtol`` is one number; of several numbers the smallest is used. ``atol`` may have one number
       for each component.
+    - ``vector="list"``: functions get states as lists of floats, which is faster where they take
+      components one by one.
+    - ``fun``, ``jac``, events and their functions may be compiled (`Compiled`).
     - ``progress=True`` shows a bar.
     - Further options are those of `integrate`, such as ``event_tolerance`` and ``max_steps``.
 
@@ -131,13 +140,8 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
     """
     if isinstance(method, type):
         method = method.__name__
-    if method in _IMPLICIT:
-        raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853': the Python package "
-                         "has no implicit method yet; for a stiff system let a ricochet.Monitor find "
-                         f"the events in the steps of scipy.integrate.{method}, or take 'RK45' where "
-                         "small steps are affordable")
     if method not in _METHODS:
-        raise ValueError(f"method: found {method!r}, expected 'RK45' or 'DOP853'")
+        raise ValueError(f"method: found {method!r}, expected some of " + meant_by(method, _METHODS))
     try:
         t0, t1 = (number_from(t, "t_span") for t in t_span)
     except (TypeError, ValueError):
@@ -154,6 +158,13 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
             raise ValueError(f"y0: found {code.what} beside a system or set_valued, expected "
                              "real components")
         options["atol"] = code.tolerances(options.get("atol", 1e-6))
+    if vector not in ("array", "list"):
+        raise ValueError(f"vector: found {vector!r}, expected 'array' or 'list'")
+    if vector == "list" and (code is not None or vectorized or isinstance(fun, (System, Ready))):
+        raise ValueError("vector: found 'list' beside vectorized, a system, or a y0 that is complex "
+                         "or empty, expected 'array'; of a system it is a member")
+    given_jac = options.get("jac")
+    jac = _jacobian(options, method, fun, start, code)
     given = _options(options, t0, t1, len(start))
     given["method"] = _METHODS[method]
     samples = _sample_times(t_eval, t0, t1)
@@ -173,12 +184,14 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
                              "system")
         source, modes = source_of(fun, args, shown and shown.watching)
         set_mode(given, fun, modes)
+        set_start_mode(given, source, start)
         count = source.guard_count
         watched = True
     else:
-        guards, is_list = _guards(events, t0, start, args or (), code)
+        guards, is_list = _guards(events, t0, start, args or (), code, vector == "list")
         count = len(guards)
         watched = is_list
+        fun = as_function(fun, C_FLOW, "fun")
         if vectorized and not isinstance(fun, Compiled):
             pointwise = fun
 
@@ -190,6 +203,7 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         flow = fun if shown is None else shown.watching(fun, False)
         source = _ricochet.callback_system(dict(
             name="solve_ivp", flow=flow, flow_title="fun", args=args, guards=guards,
+            jacobian=jac, jacobian_title="jac", as_list=vector == "list",
             set_valued=specification_of(set_valued)))
     if t0 == t1:
         if not np.isfinite(t0):
@@ -211,8 +225,40 @@ def solve_ivp(fun, t_span, y0, method="RK45", t_eval=None, dense_output=False, e
         if said is error:
             raise
         raise said from None
-    return _result(run, count if watched else None, dense_output, events_given, code,
-                   _NOTES.get(method, ""))
+    result = _result(run, count if watched else None, dense_output, events_given, code,
+                     _NOTES.get(method, ""))
+    if given_jac is not None and not callable(given_jac) and not is_compiled(given_jac):
+        result.njev = 0  # it is an array, of which nothing is computed
+    return result
+
+
+def _jacobian(options, method, fun, start, code):
+    """``jac`` for the core, of an implicit method; its further options are taken out."""
+    if _METHODS[method] != "rosenbrock4":
+        return None
+    jac = options.pop("jac", None)
+    banded = [name for name in ("lband", "uband") if options.pop(name, None) is not None]
+    options.pop("jac_sparsity", None)
+    least = options.pop("min_step", 0.0)
+    if least:
+        options["h_min"] = number_from(least, "min_step")
+    if jac is None:
+        return None
+    if banded:
+        raise ValueError(f"{banded[0]}: found beside jac, expected one of them: bands are not read")
+    if isinstance(fun, (System, Ready)):
+        raise ValueError("jac: found one beside a system, expected it as its member jacobian")
+    jac = as_function(jac, C_JACOBIAN, "jac")
+    if not callable(jac) and not isinstance(jac, Compiled):
+        constant = jac.toarray() if hasattr(jac, "toarray") else np.asarray(jac)
+        size = len(start) if code is None else code.components
+        if constant.shape != (size, size):
+            raise ValueError(f"jac: found {'shape ' + str(constant.shape) if constant.ndim else repr(jac)}, "
+                             f"expected a function (t, y) or an array of shape {(size, size)}")
+
+        def jac(t, y, *further):
+            return constant
+    return jac if code is None else code.jacobian(jac)
 
 
 def _progress_of(progress, fun, t0, t1):
@@ -220,7 +266,7 @@ def _progress_of(progress, fun, t0, t1):
     progress = _progress.check(progress)
     if progress is None or t0 == t1:
         return None
-    if isinstance(fun, (Ready, Compiled)) or isinstance(fun, System) and not is_called_from_python(fun):
+    if isinstance(fun, Ready) or is_compiled(fun) or isinstance(fun, System) and not is_called_from_python(fun):
         raise TypeError("progress: found for a system that is computed without Python, expected it "
                         "in integrate")
     return _progress.OfTime(progress, t0, t1)
@@ -240,7 +286,7 @@ def _refuse_near_names(event, who):
 #: Options that SciPy's arguments already give.
 _HERE = ("t_start", "method", "sample_times", "record_steps", "rtol", "atol")
 _ARGUMENTS = ("method", "t_eval", "dense_output", "events", "vectorized", "args", "rtol", "atol",
-              "max_step", "first_step", "set_valued")
+              "max_step", "first_step", "set_valued", "vector", "jac")
 
 
 def _is_number(given):
@@ -308,11 +354,11 @@ def _sample_times(t_eval, t0, t1):
     return times
 
 
-def _guards(events, t0, start, args, code):
+def _guards(events, t0, start, args, code, as_list):
     """A list of dictionaries of guards, and whether there are events."""
     if events is None:
         return [], False
-    if callable(events) or isinstance(events, (Guard, Compiled)):
+    if callable(events) or isinstance(events, Guard) or is_compiled(events):
         events = (events,)
     y = np.array(start) if code is None else code.shown(np.array(start))
     out = []
@@ -322,7 +368,8 @@ def _guards(events, t0, start, args, code):
             specification = dict(event._specification(index), title=who)
             out.append(specification if code is None else code.guard(specification))
             continue
-        if not callable(event) and not isinstance(event, Compiled):
+        value = as_function(event, C_GUARD, who)
+        if not callable(event) and not isinstance(value, Compiled):
             raise TypeError(f"{who}: found a {type(event).__name__}, expected a function (t, y)")
         _refuse_near_names(event, who)
         direction = getattr(event, "direction", 0)
@@ -339,16 +386,16 @@ def _guards(events, t0, start, args, code):
         if unilateral and direction == 0:
             direction = -1
         name = getattr(event, "name", None) or getattr(event, "__name__", None)
-        guard = Guard(event, name=name if isinstance(name, str) else None,
+        guard = Guard(value, name=name if isinstance(name, str) else None,
                       direction=float(np.sign(direction)), reset=reset,
                       rest=getattr(event, "rest", None), rate=getattr(event, "rate", None),
                       unilateral=unilateral, stop_after=int(terminal))
         specification = guard._specification(index)
         own = specification["name"]
         specification["title"] = who if own == str(index) else f"{who} ({own})"
-        if not isinstance(event, Compiled):
+        if not isinstance(value, Compiled):
             try:
-                first = event(t0, y.copy(), *args)
+                first = event(t0, list(start) if as_list else y.copy(), *args)
             except Exception:  # raised again, and passed on, by the run
                 first = None
             specification["boolean"] = isinstance(first, (bool, np.bool_)) or (
@@ -373,7 +420,8 @@ def _result(run, count, dense_output, events_given, code, note):
             names = [f"events[{k}]" if name == str(k) else name
                      for k, name in enumerate(run.guard_names)]
             message += f": {names[run.guard]}, {names[run.other_guard]}"
-    result.update(nfev=statistics.flow_calls, njev=0, nlu=0,
+    result.update(nfev=statistics.flow_calls, njev=statistics.jacobians,
+                  nlu=statistics.factorizations,
                   status={"reached_end": 0, "stopped_by_event": 1}.get(run.outcome, -1),
                   message=message + note, success=run.success)
     result.update(y_events_after=None, kinds=None, modes=None)

@@ -23,8 +23,34 @@ def _curve(run):
     return np.insert(t, jumps, np.nan), np.insert(x, jumps, np.nan, axis=0)
 
 
-def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None):
-    """Draws the states of a run over time, with its events as dots.
+def _spans(run):
+    """For each mode that the run was in: its name, and its intervals as rows (start, length)."""
+    changes = run.events[run.events["mode_before"] != run.events["mode_after"]]
+    bounds = np.concatenate([run.times[:1], changes["t"], [run.t]])
+    if len(changes):
+        numbers = np.concatenate([changes["mode_before"][:1], changes["mode_after"]])
+    else:
+        numbers = [list(run.modes).index(run.mode)]
+    rows = np.column_stack((bounds[:-1], np.diff(bounds)))
+    return {number: (str(getattr(run.modes[number], "name", run.modes[number])),
+                     rows[np.asarray(numbers) == number])
+            for number in sorted(set(map(int, numbers)))}
+
+
+def _shade(run, ax):
+    for number, (name, rows) in _spans(run).items():
+        ax.broken_barh(rows, (0, 1), transform=ax.get_xaxis_transform(), zorder=0,
+                       facecolor=f"C{number % 10}", alpha=0.12, linewidth=0, label=name)
+
+
+def _mark(ax, x, y, color):
+    """Events as dots, small ones where they are many."""
+    ax.plot(x, y, ".", color=color, markersize=min(6.0, max(1.5, 120 / max(len(x), 1))))
+
+
+def plot(run, components=None, *, labels=None, phase=None, events=True, modes=True, unit=None,
+         ax=None):
+    """Draws the states of a run over time, with its events as dots, on its modes as colours.
 
     Parameters
     ----------
@@ -38,7 +64,11 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
     phase : (int, int)
         Draws the second component over the first instead, with their labels at the axes.
     events : bool
-        Whether events are marked, before and after their resets.
+        Whether events are marked, before and after their resets; many of them by smaller dots.
+    modes : bool
+        Whether the intervals of each mode are shaded, over time, with its name in the legend.
+    unit : str
+        The unit of the time, for its axis.
     ax : matplotlib.axes.Axes
         The axes to draw in; by default the current ones.
 
@@ -73,15 +103,18 @@ def plot(run, components=None, *, labels=None, phase=None, events=True, ax=None)
         ax.set_ylabel(label_of.get(second, f"x[{second}]"))
         line, = ax.plot(x[:, first], x[:, second])
         for side in ("before", "after"):
-            ax.plot(marks[side][:, first], marks[side][:, second], ".", color=line.get_color())
+            _mark(ax, marks[side][:, first], marks[side][:, second], line.get_color())
         return ax
     for c, label in zip(components, labels):
         line, = ax.plot(t, x[:, c], label=label)
         for side in ("before", "after"):
-            ax.plot(marks["t"], marks[side][:, c], ".", color=line.get_color())
-    ax.set_xlabel("t")
-    if len(labels) > 1:
-        ax.legend()
-    elif labels:
+            _mark(ax, marks["t"], marks[side][:, c], line.get_color())
+    shaded = modes and run.modes is not None and len(run.events) == run.statistics.events
+    if shaded:
+        _shade(run, ax)
+    ax.set_xlabel("t" if unit is None else f"t [{unit}]")
+    if len(labels) == 1:
         ax.set_ylabel(labels[0])
+    if len(labels) > 1 or shaded:
+        ax.legend()
     return ax

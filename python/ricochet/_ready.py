@@ -6,7 +6,8 @@ from ._numbers import number_from
 
 #: Functions of a `System`, which a ready system has in C++.
 _OF_SYSTEMS = ("flow", "guard", "reset", "rest", "guard_rate", "guards", "guard_values",
-               "reset_set", "time_events", "next_time_event", "previous_time_event", "time_reset")
+               "reset_set", "time_events", "next_time_event", "previous_time_event", "time_reset",
+               "jacobian")
 
 
 class Ready:

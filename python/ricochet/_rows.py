@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from . import _ricochet
+from ._filippov import Filippov
 from ._numbers import number_from, numbers_from
 from ._run import Simulation, integrate, prepare
 from ._system import System
@@ -76,14 +77,15 @@ def run_block(system, first, starts, parameters, t_end, options):
     done, failures, events, states = [], {}, [], []
     names = modes = None
     is_made = isinstance(system, System)
-    if is_made:  # formulas are recorded once for all rows
+    is_prepared = is_made and not isinstance(system, Filippov)  # whose mode depends on the start
+    if is_prepared:  # formulas are recorded once for all rows
         source, _, common, mode_list = prepare(system, starts[0], t_end, options)
     for row, (x0, (given, named)) in enumerate(zip(starts, parameters), first):
         try:
-            if is_made:
+            if is_prepared:
                 run = _ricochet.integrate(source, x0.tolist(), common, mode_list)
             else:
-                run = integrate(system(*given, **named), x0, t_end, **options)
+                run = integrate(system if is_made else system(*given, **named), x0, t_end, **options)
         except Exception as error:
             failures[row] = _said(row, error)
             done.append(("failed", np.nan, np.empty(0), 0, (0,) * len(COUNTS)))

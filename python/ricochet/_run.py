@@ -5,7 +5,7 @@ from enum import IntEnum
 import numpy as np
 
 from . import _progress, _ricochet
-from ._compiled import Compiled
+from ._compiled import is_compiled
 from ._network import set_gate
 from ._numbers import number_from, numbers_from, state_from
 from ._ready import Ready
@@ -73,6 +73,13 @@ def set_mode(options, system, modes):
         raise ValueError(f"mode: found {given!r}, expected one of {list(names)}")
 
 
+def set_start_mode(options, source, x0):
+    """The mode of a `Filippov` at the start, where the caller gives none."""
+    if "mode" not in options and isinstance(source, _ricochet.FilippovSource):
+        t_start = number_from(options.get("t_start", 0.0), "t_start")
+        options["mode"] = source.start_mode_at(t_start, x0, 0.0)
+
+
 def source_of(system, args=None, watch=None):
     """The C++ object of a system, and its list of modes."""
     if isinstance(system, Ready):
@@ -87,8 +94,10 @@ def source_of(system, args=None, watch=None):
 
 def is_called_from_python(system):
     """Whether the flow of a system is a Python function, called in every step."""
-    return (isinstance(system, System) and system.formula is None
-            and not isinstance(system.flow, Compiled))
+    flow = system.flow if isinstance(system, System) else None
+    if flow is None:
+        flow = next(iter(getattr(system, "fields", ())), None)  # of a Filippov
+    return flow is not None and system.formula is None and not is_compiled(flow)
 
 
 def prepare(system, x0, t_end, options, args=None, watch=None):
@@ -97,6 +106,7 @@ def prepare(system, x0, t_end, options, args=None, watch=None):
     x0 = state_from(x0, "x0")
     options = dict(options, t_end=number_from(t_end, "t_end"))
     set_mode(options, system, modes)
+    set_start_mode(options, source, x0)
     set_gate(options)
     if not isinstance(options.get("atol", 0), (float, int)):
         set_tolerance(options, options["atol"], len(x0))
@@ -153,8 +163,9 @@ def integrate(system, x0, t_end, *, progress=None, **options):
         The mode at the start; by default the first, or that of the ready system.
     method : str
         ``"dopri5"`` (default), ``"fehlberg78"``, ``"taylor"`` (ready systems and formulas),
-        ``"cash-karp54"``, ``"rk4"``, ``"euler"``; the last two have no error estimate and need
-        ``fixed=True``.
+        ``"rosenbrock4"`` (implicit, for stiff systems of up to a few dozen components, with the
+        ``jacobian`` of the system, else differences), ``"cash-karp54"``, ``"rk4"``, ``"euler"``;
+        the last two have no error estimate and need ``fixed=True``.
     fixed : bool
         Steps of length ``step`` instead of error control.
     rtol, atol : float
@@ -206,8 +217,6 @@ class Simulation(_ricochet.Simulation):
     """
 
     def __init__(self, system, x0, t_end, **options):
-        if options.pop("record_steps", False):
-            options["dense"] = True
         source, x0, options, modes = prepare(system, x0, t_end, options)
         super().__init__(source, x0, options, modes)
         self._of = system, modes

@@ -2,14 +2,17 @@
 
 import inspect
 from collections.abc import Iterator
+from enum import Enum
 from functools import lru_cache
 from numbers import Real
 from types import MethodType
 
 from . import _ricochet
-from ._compiled import Compiled
+from ._compiled import (C_FLOW, C_GUARD, C_JACOBIAN, C_RATE, C_RESET, Compiled, as_function,
+                        is_compiled)
 from ._formula import Formula
 from ._inclusion import specification_of
+from ._kept import Kept, fingerprint
 from ._numbers import meant_by, number_from
 
 #: The largest number of events after which a guard can end the run.
@@ -22,6 +25,11 @@ _OF_GUARDS = {name: name for name in (
     "degree", "touch", "stop_after", "at_start", "at_entry", "speed_bound", "acceleration_bound", "lower_bound",
     "upper_bound", "lipschitz", "resets", "directed")}
 _OF_GUARDS["terminal"] = "stop_after"
+
+#: What compiled functions of a guard are declared as; `enabled` is not among them.
+_DECLARED = {"value": C_GUARD, "rate": C_RATE, "reset": C_RESET, "rest": C_RESET,
+             "speed_bound": C_GUARD, "acceleration_bound": C_GUARD, "lower_bound": C_GUARD,
+             "upper_bound": C_GUARD}
 
 
 class Stop(Exception):
@@ -177,12 +185,14 @@ class Guard:
 
     def _specification(self, index, owner=None):
         out = dict(self._numbers)
+        name = self.name or getattr(self._functions["value"], "__name__", None)
+        out["name"] = str(index) if name in (None, "<lambda>", "<cdata>") else name
         for what, function in self._functions.items():
+            if function is not None and not hasattr(function, "__code__"):
+                function = self._compiled(what, function, out["name"])
             if owner is not None and function is not None and not isinstance(function, Compiled):
                 function = MethodType(function, owner)
             out[what] = function
-        name = self.name or getattr(self._functions["value"], "__name__", None)
-        out["name"] = str(index) if name in (None, "<lambda>") else name
         if out["in_modes"] is not None:
             if isinstance(out["in_modes"], str):
                 out["in_modes"] = [out["in_modes"]]
@@ -199,6 +209,15 @@ class Guard:
                              "-1, 0 or 1")
         return out
 
+    @staticmethod
+    def _compiled(what, function, name):
+        who = f"guard {name}" if what == "value" else f"{what} of guard {name}"
+        if what in _DECLARED:
+            return as_function(function, _DECLARED[what], who)
+        if is_compiled(function):
+            raise TypeError(f"{who}: found a compiled function, expected one of Python")
+        return function
+
     def __repr__(self):
         return f"Guard({self.name!r})"
 
@@ -213,7 +232,7 @@ def guard(value=None, **options):
 _KNOWN = ("flow", "guard", "reset", "rest", "guard_rate", "unilateral", "direction", "modes",
           "name", "guards", "guard_values", "reset_set", "time_events", "next_time_event",
           "previous_time_event", "time_reset", "changes_dimension", "parameters", "formula",
-          "set_valued")
+          "set_valued", "jacobian", "vector")
 
 
 def _plain_guard(function, index):
@@ -312,6 +331,12 @@ class System:
     set_valued
         An `Inclusion`: friction, relays and stops, of which the motion becomes a part where they
         hold something; or a method that returns one.
+    jacobian(t, x) -> numbers, shape (n, n)
+        The derivatives of the flow by the state, for ``method="rosenbrock4"``; also a sparse
+        matrix. By default differences; exact where the system has a ``formula``.
+    vector : "array" or "list"
+        What states are passed as: arrays, or lists of floats, which are several times faster in
+        functions that take a few components one by one.
     name, parameters
         Identification for networks: a text, and a dictionary of numbers.
     """
@@ -330,6 +355,8 @@ class System:
     parameters = None
     formula = None
     set_valued = None
+    jacobian = None
+    vector = "array"
     _unchecked_names = False
 
     def __init__(self, flow=None, guards=None, **members):
@@ -395,7 +422,7 @@ class System:
     def _guard_list(self):
         out = []
         guards = self._read_again("guards")
-        if isinstance(guards, (Guard, Compiled)) or callable(guards):
+        if isinstance(guards, Guard) or is_compiled(guards) or callable(guards):
             raise TypeError(f"guards: found a {type(guards).__name__}, expected a sequence: "
                             "guards=[...]")
         if getattr(self, "guard", None) is not None:
@@ -441,22 +468,42 @@ class System:
         if type(components) is not int or components < 1:
             raise ValueError(f"formula: found {components!r}, expected the number of components of "
                              "the state")
+        if self.jacobian is not None:
+            raise ValueError("jacobian: found one beside formula, expected none, since that of a "
+                             "formula is exact")
         for what in ("guard_values", "changes_dimension"):
             if getattr(self, what):
                 raise ValueError(f"{what}: found one beside formula, expected guards by "
                                  "themselves, and a state that keeps its size")
         for guard in guards:
-            function, within = guard["value"], guard["in_modes"]
-            if isinstance(function, Compiled):
+            if isinstance(guard["value"], Compiled):
                 raise TypeError(f"guard {guard['name']}: found a compiled function beside formula")
-
-            def value(*given, function=function, within=within):
-                return 1.0 if within is not None and given[0] not in within else function(*given)
-            title = f"guard {guard['name']}"
-            guard["value"] = Formula(value, components, modes, args, title, False)
-        if isinstance(self.flow, Compiled):
+        if is_compiled(self.flow):
             raise TypeError("flow: found a compiled function beside formula")
-        return Formula(self.flow, components, modes, args, "flow", True)
+        # Functions are called with symbols again only where something that they read has changed.
+        functions = [self.flow, *(guard["value"] for guard in guards)]
+        of = fingerprint(functions, self, args)
+        if of is not None and all(isinstance(mode, (int, str, Enum)) for mode in modes or ()):
+            of = of, components, modes, [guard["in_modes"] for guard in guards]
+        else:
+            of = None
+        kept = vars(self).setdefault("_kept", Kept())
+        known, formulas = kept.pair
+        if of is None or known != of:
+            formulas = [Formula(self.flow, components, modes, args, "flow", True)]
+            formulas += [self._guard_formula(guard, components, modes, args) for guard in guards]
+            kept.pair = of, formulas
+        for guard, formula in zip(guards, formulas[1:]):
+            guard["value"] = formula
+        return formulas[0]
+
+    @staticmethod
+    def _guard_formula(guard, components, modes, args):
+        function, within = guard["value"], guard["in_modes"]
+
+        def value(*given):
+            return 1.0 if within is not None and given[0] not in within else function(*given)
+        return Formula(value, components, modes, args, f"guard {guard['name']}", False)
 
     def _refuse_arguments(self, args):
         """Rejects a flow with a mode in a system without modes, and the reverse."""
@@ -476,8 +523,11 @@ class System:
 
     def _source(self, args=None, watch=None):
         """The C++ object; ``watch(flow, is_moded)`` may put a function around the flow."""
-        if not callable(self.flow) and not isinstance(self.flow, Compiled):
+        flow = as_function(self.flow, C_FLOW, "flow")
+        if not callable(flow) and not isinstance(flow, Compiled):
             raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
+        if self.vector not in ("array", "list"):
+            raise ValueError(f"vector: found {self.vector!r}, expected 'array' or 'list'")
         self._refuse_arguments(args)
         following, preceding = self.next_time_event, self.previous_time_event
         times = None
@@ -499,7 +549,8 @@ class System:
                              "guards=[Guard(name=...), ...]")
         if not guards and self.reset_set is not None:
             raise ValueError("reset_set: found it without guards, expected some, or a time_reset")
-        flow = self.flow if self.formula is None else self._formulas(args, guards)
+        if self.formula is not None:
+            flow = self._formulas(args, guards)
         if watch is not None:
             flow = watch(flow, self.modes is not None)
         source = _ricochet.callback_system(dict(
@@ -508,7 +559,9 @@ class System:
             guard_values=self.guard_values, reset_set=self.reset_set,
             time_events=times, next_time_event=None if at else following,
             next_time_event_at=following if at else None, previous_time_event=preceding,
-            time_reset=self.time_reset, changes_dimension=self.changes_dimension,
+            time_reset=as_function(self.time_reset, C_RESET, "time_reset"),
+            changes_dimension=self.changes_dimension, as_list=self.vector == "list",
+            jacobian=as_function(self.jacobian, C_JACOBIAN, "jacobian"),
             set_valued=specification_of(self.set_valued)))
         if self.parameters is not None:
             source.parameters = {name.replace("_", "-"): float(value)

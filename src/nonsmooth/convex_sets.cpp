@@ -1,6 +1,7 @@
 #include "ricochet/nonsmooth/inclusion.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <random>
 #include <stdexcept>

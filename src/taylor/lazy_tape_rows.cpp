@@ -198,6 +198,7 @@ void LazyTape::arrange()
     for (std::size_t i = 0; i < tape_.ops_count; ++i) factors_[places_[i]] = constants_[i];
     sums_.assign(width_ + 4, 0);
     other_sums_ = sums_;
+    write_program();
 }
 
 /// Places a batch behind the others, by its operands, with room for a whole number of blocks.
@@ -459,6 +460,7 @@ void LazyTape::add_up_inverse(const Batch& batch, int k)
 int LazyTape::compute(double t, const double* x, const TaylorCoefficients<double>& to)
 {
     const int order = is_polynomial() ? degree_ : to.order;
+    if (!program_.empty()) return run_program(t, x, to, order);
     start(t, x);
     std::copy_n(x, tape_.states, to.x);
     advance(0, to.x, to.guards);

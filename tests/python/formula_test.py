@@ -153,3 +153,134 @@ def test_formulas_of_another_size_are_refused():
     with pytest.raises(ValueError, match="not finite"):
         ricochet.integrate(ricochet.System(lambda t, x: [math.nan * x[0]], formula=1), [1.0], 1.0,
                            method="taylor")
+
+
+def test_a_reset_is_told_the_direction_by_series_too():
+    seen = []
+
+    def reset(t, x, direction):
+        seen.append(direction)
+        return x
+
+    guard = ricochet.Guard(lambda t, x: x[0], direction=0, directed=True, reset=reset)
+    system = ricochet.System(lambda t, x: [x[1], -x[0]], [guard], formula=2)
+    for method in ("taylor", "fehlberg78"):
+        seen.clear()
+        run = ricochet.integrate(system, [1.0, 0.0], 9.0, method=method)
+        assert len(run.events) >= 3 and seen[:3] == [-1, 1, -1]
+
+
+# --- formulas that a system keeps ---
+
+FACTOR = 2.0
+
+
+def helper(x):
+    return FACTOR * x
+
+
+class Calls(ricochet.System):
+    """Counts how often its functions are called with symbols."""
+
+    formula = 1
+    rate = 1.0
+    table = [1.0, 2.0]
+
+    def __init__(self):
+        super().__init__()
+        self.offset = 0.0
+
+    def flow(self, t, x):
+        calls.append("flow")
+        return [helper(x[0]) * self.rate + self.offset + self.table[1]]
+
+    def guard(self, t, x):
+        return x[0] - 5
+
+
+calls = []
+
+
+def recorded(system, **more):
+    calls.clear()
+    run = ricochet.integrate(system, [1.0], 0.1, **more)
+    return bool(calls), run.x[0]
+
+
+def test_formulas_are_recorded_again_where_something_they_read_has_changed():
+    global FACTOR
+
+    system = Calls()
+    assert recorded(system)[0]
+    # `calls` itself is read by the function, and has changed by the call; another one has not.
+    first = recorded(system)
+    again = recorded(system)
+    assert not again[0] and again[1] == first[1]
+    seen = {again[1]}
+    for change in (lambda: setattr(system, "offset", 1.0), lambda: setattr(Calls, "rate", 3.0),
+                   lambda: Calls.table.__setitem__(1, 7.0), lambda: setattr(system, "rate", -0.5),
+                   lambda: globals().__setitem__("FACTOR", 4.0)):
+        change()
+        was_recorded, x = recorded(system)
+        assert was_recorded and x not in seen
+        seen.add(x)
+    FACTOR = 2.0
+
+
+def test_a_sign_of_zero_is_a_change():
+    sign = [0.0]
+    system = ricochet.System(lambda t, x: [1.0 + 0 * x[0] / np.hypot(x[0], 1) + np.arctan2(sign[0], -1.0 + 0 * x[0])],
+                             formula=1)
+    up = ricochet.integrate(system, [1.0], 1.0).x[0]
+    sign[0] = -0.0
+    assert ricochet.integrate(system, [1.0], 1.0).x[0] < 0 < up
+
+
+def test_what_may_change_unseen_is_recorded_for_every_run():
+    class Box:
+        value = 1.0
+
+    box, noted = Box(), []
+
+    def flow(t, x):
+        noted.append(1)
+        return [box.value * x[0]]
+
+    system = ricochet.System(flow, formula=1)
+    first = ricochet.integrate(system, [1.0], 1.0).x[0]
+    box.value = 2.0
+    assert abs(ricochet.integrate(system, [1.0], 1.0).x[0] - first**2) < 1e-6 and len(noted) == 2
+    flow.factor = 1.0
+    for factor in (1.0, 3.0):
+        flow.factor = factor
+        own = ricochet.System(lambda t, x: [flow.factor + 0 * x[0]], formula=1)
+        assert ricochet.integrate(own, [0.0], 1.0).x[0] == pytest.approx(factor)
+
+
+def test_kept_formulas_do_not_hinder_copies_and_threads():
+    import copy
+    import pickle
+    from concurrent.futures import ThreadPoolExecutor
+
+    system = Calls()
+    expected = recorded(system)[1]
+    for again in (copy.copy(system), copy.deepcopy(system), pickle.loads(pickle.dumps(system))):
+        assert recorded(again)[1] == expected
+    with ThreadPoolExecutor(4) as threads:
+        ends = list(threads.map(lambda _: ricochet.integrate(system, [1.0], 0.1).x[0], range(40)))
+    assert set(ends) == {expected}
+
+
+def test_modes_args_and_guards_have_their_own_formulas():
+    system = ricochet.System(lambda mode, t, x: [1.0 if mode == "up" else -1.0 + 0 * x[0]],
+                             modes=("up", "down"), formula=1)
+    for mode, end in (("up", 1.0), ("down", -1.0), ("up", 1.0)):
+        assert ricochet.integrate(system, [0.0], 1.0, mode=mode).x[0] == pytest.approx(end)
+    scaled = ricochet.System(lambda t, x, a: [a + 0 * x[0]], formula=1)
+    for a in (1.0, 2.0, 1.0):
+        assert ricochet.solve_ivp(scaled, (0, 1), [0.0], args=(a,)).y[0, -1] == pytest.approx(a)
+    guard = ricochet.Guard(lambda t, x: x[0] - 0.5, direction=1)
+    guarded = ricochet.System(lambda t, x: [1.0 + 0 * x[0]], [guard], formula=1)
+    assert ricochet.integrate(guarded, [0.0], 1.0).events["t"][0] == pytest.approx(0.5)
+    guarded.guards = [ricochet.Guard(lambda t, x: x[0] - 0.75, direction=1)]
+    assert ricochet.integrate(guarded, [0.0], 1.0).events["t"][0] == pytest.approx(0.75)

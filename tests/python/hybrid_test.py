@@ -397,6 +397,30 @@ def test_a_simulation_by_hand():
     assert stepped.run.t == 1.0
 
 
+@pytest.mark.parametrize("system, start, t_end, more", [
+    (ricochet.BouncingBall(), [10.0, 0.0], 20.5, {}),
+    (ricochet.BouncingBall(), [10.0, 0.0], 20.5, {"event_states": False}),
+    (ricochet.Thermostat(), [20.0], 20.0, {"method": "taylor"}),
+    (ricochet.System(fall), [1.0, 0.0], -2.0, {}),
+    (ricochet.System(lambda t, x: [-x[0]], time_events=[0.5, 0.5, 1.0],
+                     time_reset=lambda t, x: [x[0] + 1]), [1.0], 1.0, {}),
+])
+def test_a_driven_run_keeps_the_ends_of_its_steps(system, start, t_end, more):
+    whole = ricochet.integrate(system, start, t_end, record_steps=True, **more)
+    driven = ricochet.Simulation(system, start, t_end, record_steps=True, **more)
+    driven.step()
+    assert driven.run.times.tolist()[0] == 0.0 and driven.run.times[-1] == driven.t
+    for _ in driven:
+        pass
+    run = driven.finish()
+    assert np.array_equal(run.times, whole.times)
+    assert np.array_equal(run.states, whole.states)
+    sampled = ricochet.Simulation(system, start, t_end, record_steps=True,
+                                  sample_times=[0.25 * t_end], **more).run_to_end()
+    assert sampled.times.tolist() == [0.25 * t_end] and sampled.solution is not None
+    assert ricochet.Simulation(system, start, t_end).run_to_end().times.size == 0
+
+
 def test_pictures(tmp_path):
     matplotlib = pytest.importorskip("matplotlib")
     matplotlib.use("Agg")

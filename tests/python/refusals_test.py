@@ -110,8 +110,6 @@ def test_starts_that_are_none(y0, error):
 
 
 @pytest.mark.parametrize("options, error, words", [
-    ({"method": "Radau"}, ValueError, "the Python package has no implicit method"),
-    ({"method": "BDF"}, ValueError, "implicit"), ({"method": "LSODA"}, ValueError, "implicit"),
     ({"method": "rk"}, ValueError, "'rk'"), ({"method": 3}, ValueError, "3"),
     ({"t_eval": [0.5, 2.0]}, ValueError, "2.0"), ({"t_eval": [-1.0]}, ValueError, "-1.0"),
     ({"t_eval": [0.5, 0.2]}, ValueError, "order"), ({"t_eval": [[0.5]]}, ValueError, "dimensions"),

@@ -233,12 +233,6 @@ def test_a_method_of_another_order_says_so():
     assert result.message.startswith(same.message) and "'RK23' was run as 'RK45'" in result.message
 
 
-def test_implicit_methods_say_what_to_do():
-    for method in ("Radau", "BDF", "LSODA"):
-        with pytest.raises(ValueError, match=rf"Monitor .* steps of scipy.integrate.{method}"):
-            ricochet.solve_ivp(swing, (0, 1), [1.0, 0.0], method=method)
-
-
 def test_results_have_scipys_types_where_scipy_is_loaded():
     integrate = pytest.importorskip("scipy.integrate")
     from scipy.optimize import OptimizeResult

@@ -61,6 +61,32 @@ def test_a_notebook_shows_a_picture_where_there_are_states(monkeypatch):
     assert "<img" not in run._repr_html_()
 
 
+def test_modes_are_shaded_and_many_marks_are_small():
+    matplotlib = pytest.importorskip("matplotlib")
+    from matplotlib.figure import Figure
+
+    run = ricochet.integrate(Heater(), [20.0], 1.0, record_steps=True)
+    switch = run.events["t"][0]
+    ax = ricochet.plot(run, unit="h", ax=Figure().subplots())
+    assert ax.get_xlabel() == "t [h]" and ax.get_ylabel() == "x[0]"
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["x[0]", "<off>", "on"]
+    spans = [path.get_extents() for each in ax.collections for path in each.get_paths()]
+    assert [(span.x0, span.x1) for span in spans] == [(0.0, switch), (switch, 1.0)]
+    plain = ricochet.plot(run, modes=False, ax=Figure().subplots())
+    assert not plain.collections and plain.get_legend() is None
+    one = ricochet.integrate(Heater(), [25.0], 0.1, record_steps=True)
+    assert len(ricochet.plot(one, ax=Figure().subplots()).collections) == 1
+    unknown = ricochet.integrate(Heater(), [20.0], 1.0, record_steps=True, record_events=False)
+    assert not ricochet.plot(unknown, ax=Figure().subplots()).collections
+    few, many = (ricochet.plot(bouncing(record_steps=True, **more), ax=Figure().subplots()).lines[1]
+                 for more in ({}, {"h_max": 1e-2}))
+    assert few.get_markersize() == many.get_markersize() > 5
+    crowded = ricochet.integrate(ricochet.Pendulum(), [-0.05, 0.0], 300.0, record_steps=True)
+    assert len(crowded.events) > 250
+    assert ricochet.plot(crowded, ax=Figure().subplots()).lines[1].get_markersize() < 2
+    assert matplotlib
+
+
 def test_a_function_sees_the_progress():
     def fall(t, x):
         return [x[1], -9.81]

@@ -107,6 +107,38 @@ def watched() -> List[int]:
     return monitor.held
 
 
+def stiff() -> int:
+    def jacobian(t: float, x: List[float]) -> List[List[float]]:
+        return [[-1e4]]
+
+    system = ricochet.System(lambda t, x: [-1e4 * x[0]], jacobian=jacobian, vector="list")
+    run = ricochet.integrate(system, [1.0], 1.0, method="rosenbrock4")
+    result = ricochet.solve_ivp(lambda t, y: [-1e4 * y[0]], (0, 1), [1.0], "BDF", vector="list",
+                                jac=jacobian)
+    return result.njev + int(run.success)
+
+
+def sliding() -> str:
+    block = ricochet.Filippov(lambda t, x: x[0], [lambda t, x: [1.0], lambda t, x: [-1.0]],
+                              restoring_rate=1.0)
+    share: Floats = block.shares("sliding", 0.0, [0.0])
+    assert share.shape == (1,)
+    return block.start_mode(0.0, [1.0], tolerance=0.1)
+
+
+def scene() -> None:
+    try:
+        made = ricochet.Scene(gravity=(0, -9.81))
+    except ImportError:  # a package without scenes
+        return
+    made.material("steel", restitution=0.5)
+    floor: int = made.wall((0, 0), (0, 1), material="steel", motion={"velocity": (0, 0.1)})
+    disc: int = made.disc((0, 2), radius=0.1, name="disc")
+    run: ricochet.SceneRun = made.simulate(1.0, sample_times=[0.5])
+    assert floor == disc == 0 and run.trajectory.shape == (1, 1, 2)
+    assert run.events["kind"][0] == ricochet.SceneKind.IMPACT and run.energy_at_end > 0
+
+
 def refused() -> None:
     """Mistakes that the types show: strict checking complains where an error is missing."""
     try:
@@ -124,5 +156,5 @@ def refused() -> None:
 
 
 if __name__ == "__main__":
-    for example in (solved, integrated, driven, many, watched, refused):
+    for example in (solved, integrated, driven, many, watched, stiff, sliding, scene, refused):
         example()

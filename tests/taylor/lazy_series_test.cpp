@@ -373,6 +373,75 @@ struct Thrown {
     }
 };
 
+/// Pairs that do not depend on each other. The kinds have, together, every function that is
+/// computed from sums of products.
+struct Pairs {
+    using State = Vector;
+    int kind = 0;
+
+    template <class S>
+    void flow(const S& t, const std::vector<S>& x, std::vector<S>& dxdt) const
+    {
+        for (std::size_t i = 0; i < x.size(); i += 2) {
+            rates(t, x[i], x[i + 1], dxdt[i], dxdt[i + 1]);
+        }
+    }
+
+private:
+    template <class S>
+    void rates(const S& t, const S& a, const S& b, S& first, S& second) const
+    {
+        using std::cos, std::exp, std::sin, std::sinh, std::sqrt, std::tan, std::tanh;
+        switch (kind) {
+            case 0:
+                first = exp(-a) * sin(b);
+                second = a * b - 2.5 * a;
+                break;
+            case 1:
+                first = sqrt(2.0 + a * a) / (3.0 + b);
+                second = 0.1 * t - b;
+                break;
+            case 2:
+                first = -1.0 / (2.0 + cos(b));
+                second = a - 1.0;
+                break;
+            default: first = tanh(a) - tan(0.1 * b); second = 0.25 * sinh(-b);
+        }
+    }
+};
+
+/// Coefficients up to order 20 of so many pairs, of equal starts.
+std::vector<double> series_of_pairs(int kind, std::size_t pairs, bool short_tape)
+{
+    const std::size_t n = 2 * pairs;
+    detail::Recording recording;
+    std::vector<int> outputs(n);
+    record_into(Pairs{kind}, 0, recording, std::vector<detail::Recorded>(n), outputs);
+    detail::LazyTape tape(n, recording, outputs);
+    // Up to 10 operations are computed one by one.
+    EXPECT_EQ(tape.operations() <= 10, short_tape) << tape.operations();
+    Vector x(n);
+    for (std::size_t i = 0; i < n; ++i) x[i] = i % 2 == 0 ? 0.3 : -0.7;
+    std::vector<double> out(21 * n);
+    EXPECT_EQ(tape.compute(0.5, x.data(), {20, out.data(), nullptr}), 20);
+    return out;
+}
+
+TEST(LazySeries, AShortTapeHasTheBitsOfOperationsSideBySide)
+{
+    for (const int kind : {0, 1, 2, 3}) {
+        const auto one = series_of_pairs(kind, 1, true);
+        const auto four = series_of_pairs(kind, 4, false);
+        for (std::size_t k = 0; k <= 20; ++k) {
+            for (std::size_t i = 0; i < 8; ++i) {
+                EXPECT_EQ(four[8 * k + i], one[2 * k + i % 2])
+                    << "kind " << kind << ", order " << k << ", component " << i;
+            }
+        }
+        EXPECT_TRUE(std::isfinite(one[40]) && one[40] != 0) << kind;
+    }
+}
+
 TEST(LazySeries, PolynomialsInTimeAreKnownAsSuch)
 {
     const auto run = integrate(Thrown{}, Vector{10, 0}, {.t_end = 20.5, .rtol = 1e-12}, ByTaylor{});

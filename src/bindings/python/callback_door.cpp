@@ -9,10 +9,18 @@
 
 #include "callbacks.hpp"
 #include "formula_door.hpp"
+#include "implicit.hpp"
 #include "numbers.hpp"
 #include "ricochet/detail/guard_view.hpp"
+#include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::python {
+
+template <>
+void FormulaDoor<detail::TaylorOf<0>>::choose_method(detail::RunSetup<State>& setup)
+{
+    detail::step_by_series<FormulaSystem, State, 0>(setup);
+}
 
 namespace {
 
@@ -25,7 +33,10 @@ class CallbackDoor final : public RunDoor {
     using Table = detail::SystemTable<State>;
 
 public:
-    explicit CallbackDoor(const CallbackSource& source) : source_(source) {}
+    explicit CallbackDoor(const CallbackSource& source)
+        : source_(source), x_(source.as_list_), dxdt_(source.as_list_)
+    {
+    }
 
     [[nodiscard]] const Table& table() const noexcept override { return source_.table_; }
     [[nodiscard]] void* door() noexcept override { return this; }
@@ -36,6 +47,19 @@ public:
     }
     void add_inclusions(detail::PhasedSetup<State>& setup, std::size_t n,
                         const Options& options) override;
+    bool jacobian(Mode mode, double t, const State& x, std::span<double> rows) override
+    {
+        const Function& function = source_.jacobian_;
+        if (!function) return false;
+        if (function.address) {
+            reinterpret_cast<CompiledFlow>(function.address)(mode, t, x.data(), rows.data(),
+                                                             x.size(), function.user);
+            return true;
+        }
+        const Ref result = call(function, mode, t, x_.show(x));
+        read_square(result.get(), source_.jacobian_title_, x.size(), rows.data());
+        return true;
+    }
 
     static void fill(Table& table, const CallbackSource& source)
     {
@@ -207,7 +231,7 @@ private:
         const Function& function = source_.flow_;
         if (dxdt.size() != x.size()) dxdt.resize(x.size());
         if (function.address) {
-            watch_.tick();
+            watch().tick();
             reinterpret_cast<CompiledFlow>(function.address)(mode, t, x.data(), dxdt.data(),
                                                              x.size(), function.user);
             return true;
@@ -661,16 +685,31 @@ std::unique_ptr<RunDoor> CallbackSource::open(const State& x0) const
     return std::make_unique<CallbackDoor>(*this);
 }
 
-std::unique_ptr<RunDoor> CallbackSource::open_by_series(const State& x0) const
+std::optional<std::vector<const ModedFormula*>> CallbackSource::guard_formulas() const
 {
-    if (!flow_.is_formula) return Source::open_by_series(x0);
     std::vector<const ModedFormula*> guards;
     for (const CallbackGuard& guard : guards_) {
-        if (!guard.value.is_formula) return Source::open_by_series(x0);
+        if (!guard.value.is_formula) return std::nullopt;
         guards.push_back(static_cast<const ModedFormula*>(guard.value.user));
     }
-    return std::make_unique<FormulaDoor>(open(x0), *static_cast<const ModedFormula*>(flow_.user),
-                                         std::move(guards), x0);
+    return guards;
+}
+
+std::unique_ptr<RunDoor> CallbackSource::open_by_series(const State& x0) const
+{
+    auto guards = guard_formulas();
+    if (!flow_.is_formula || !guards) return Source::open_by_series(x0);
+    const auto& flow = *static_cast<const ModedFormula*>(flow_.user);
+    return std::make_unique<FormulaDoor<detail::TaylorOf<0>>>(open(x0), flow, std::move(*guards),
+                                                              x0);
+}
+
+std::unique_ptr<RunDoor> CallbackSource::open_implicit(const State& x0) const
+{
+    auto guards = guard_formulas();
+    if (!flow_.is_formula || !guards) return implicit_door(open(x0), x0);
+    const auto& flow = *static_cast<const ModedFormula*>(flow_.user);
+    return implicit_formula_door(open(x0), flow, std::move(*guards), x0);
 }
 
 }  // namespace ricochet::python

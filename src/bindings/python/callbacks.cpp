@@ -83,6 +83,10 @@ CallbackSource::CallbackSource(PyObject* specification)
     if (flow_title_.empty()) flow_title_ = "flow";
     flow_ = Function(item(specification, "flow").get(), flow_title_);
     if (!flow_) raise(PyExc_TypeError, flow_title_ + ": found None, expected a function");
+    jacobian_title_ = text_in(specification, "jacobian_title");
+    if (jacobian_title_.empty()) jacobian_title_ = "jacobian";
+    jacobian_ = Function(item(specification, "jacobian").get(), jacobian_title_);
+    as_list_ = truth_in(specification, "as_list");
     guard_values_ = function("guard_values");
     reset_set_ = function("reset_set");
     next_time_event_ = function("next_time_event");
@@ -144,8 +148,9 @@ CallbackSource::CallbackSource(PyObject* specification)
     }
 
     const auto is_free = [](const Function& f) { return !f || f.address; };
-    free_ = is_free(flow_) && !guard_values_ && !reset_set_ && !next_time_event_ &&
-            !next_time_event_at_ && !previous_time_event_ && is_free(time_reset_) && !inclusion_;
+    free_ = is_free(flow_) && is_free(jacobian_) && !guard_values_ && !reset_set_ &&
+            !next_time_event_ && !next_time_event_at_ && !previous_time_event_ &&
+            is_free(time_reset_) && !inclusion_;
     for (const CallbackGuard& guard : guards_) {
         free_ = free_ && is_free(guard.value) && is_free(guard.rate) && is_free(guard.reset) &&
                 is_free(guard.rest) && !guard.enabled && is_free(guard.speed_bound) &&

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "formula.hpp"
 #include "nonsmooth/sized_inclusion.hpp"
 #include "source.hpp"
 
@@ -78,6 +79,7 @@ public:
     /// @throws std::invalid_argument for a start that does not fit its formulas
     [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override;
     [[nodiscard]] std::unique_ptr<RunDoor> open_by_series(const State& x0) const override;
+    [[nodiscard]] std::unique_ptr<RunDoor> open_implicit(const State& x0) const override;
     [[nodiscard]] std::vector<std::string> mode_names() const override;
     [[nodiscard]] std::vector<std::string> guard_names() const override;
 
@@ -90,10 +92,13 @@ private:
     [[nodiscard]] std::vector<bool> modes_in(PyObject* specification,
                                              const std::string& title) const;
     void fill_table();
+    /// The guards as formulas; nothing if one of them is none.
+    [[nodiscard]] std::optional<std::vector<const ModedFormula*>> guard_formulas() const;
 
     std::string name_;
-    std::string flow_title_;  ///< in messages: "flow", "fun"
-    Function flow_, guard_values_, reset_set_;
+    std::string flow_title_;      ///< in messages: "flow", "fun"
+    std::string jacobian_title_;  ///< "jacobian", "jac"
+    Function flow_, jacobian_, guard_values_, reset_set_;
     Function next_time_event_, next_time_event_at_, previous_time_event_, time_reset_;
     std::optional<Times> times_;  ///< a list of time events, or a clock
     std::vector<CallbackGuard> guards_;
@@ -102,7 +107,8 @@ private:
     Ref mode_list_, mode_numbers_;  ///< names of the modes and their numbers; null without modes
     std::size_t mode_count_ = 0;
     bool moded_ = false;
-    bool free_ = false;  ///< whether none of its functions needs the interpreter
+    bool as_list_ = false;  ///< states are passed as lists of floats
+    bool free_ = false;     ///< whether none of its functions needs the interpreter
     detail::SystemTable<State> table_;
 };
 

@@ -1,6 +1,7 @@
-// The door of a run whose flow and guards are formulas, by power series.
+// The door of a run whose flow and guards are formulas, for methods that take their derivatives.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -8,8 +9,10 @@
 #include <vector>
 
 #include "formula.hpp"
+#include "forwarding.hpp"
+#include "ricochet/detail/stepper_door.hpp"
 #include "ricochet/detail/system_table.hpp"
-#include "ricochet/taylor/taylor.hpp"
+#include "ricochet/dual.hpp"
 #include "source.hpp"
 
 namespace ricochet::python {
@@ -44,6 +47,10 @@ public:
     void flow(Mode mode, const S& t, const std::vector<S>& x, std::vector<S>& dxdt) const
     {
         callbacks_->watch().tick();
+        if constexpr (is_dual<S>) {
+            // The derivative by the time is asked for once for each Jacobian.
+            callbacks_->implicit().jacobians += std::ranges::any_of(t.slope, is_set);
+        }
         flow_->in(mode).evaluate(t, x, dxdt, scratch<S>());
     }
     template <class S>
@@ -56,6 +63,13 @@ public:
     }
 
 private:
+    template <class S>
+    static constexpr bool is_dual = requires(const S& s)
+    {
+        s.slope;
+    };
+    [[nodiscard]] static bool is_set(double slope) noexcept { return slope != 0; }
+
     template <class S>
     [[nodiscard]] static std::vector<S>& scratch()
     {
@@ -71,18 +85,20 @@ private:
 
 /// @param callbacks  a door to the system, used for resets and all functions other than flow and
 /// guards
+/// @tparam Method  of the steps: `TaylorOf<0>` or `Rosenbrock4`
+template <class Method>
 class FormulaDoor final : public RunDoor {
     using Table = detail::SystemTable<State>;
-    using Method = detail::TaylorOf<0>;
 
 public:
     FormulaDoor(std::unique_ptr<RunDoor> callbacks, const ModedFormula& flow,
                 std::vector<const ModedFormula*> guards, const State& x0)
         : callbacks_(std::move(callbacks)),
-          table_(table_beside(callbacks_->table())),
+          table_(detail::system_table<FormulaSystem, State>),
           system_(*callbacks_, flow, std::move(guards), flow.by_mode.size()),
           door_(system_, x0)
     {
+        Forwarding<FormulaSystem>::all_but_flow_and_guards(table_, callbacks_->table());
     }
 
     [[nodiscard]] const Table& table() const noexcept override { return table_; }
@@ -91,57 +107,11 @@ public:
         return static_cast<detail::Door<FormulaSystem, State>*>(&door_);
     }
     [[nodiscard]] bool is_free() const noexcept override { return callbacks_->is_free(); }
-    void step_by_series(detail::RunSetup<State>& setup) override
-    {
-        detail::step_by_series<FormulaSystem, State, 0>(setup);
-    }
+    void choose_method(detail::RunSetup<State>& setup) override;
     [[nodiscard]] SignalWatch& watch() noexcept override { return callbacks_->watch(); }
+    [[nodiscard]] ImplicitCounts& implicit() noexcept override { return callbacks_->implicit(); }
 
 private:
-    /// Forwards a call to the other door.
-    template <auto member>
-    struct Forward;
-    template <class R, class... A, R (*Table::*member)(void*, A...)>
-    struct Forward<member> {
-        static R call(void* door, A... arguments)
-        {
-            RunDoor& to =
-                static_cast<detail::Door<FormulaSystem, State>*>(door)->system().callbacks();
-            return (to.table().*member)(to.door(), arguments...);
-        }
-    };
-    template <auto member>
-    static void forward(Table& table, const Table& from)
-    {
-        table.*member = from.*member ? &Forward<member>::call : nullptr;
-    }
-
-    [[nodiscard]] static Table table_beside(const Table& from)
-    {
-        Table table = detail::system_table<FormulaSystem, State>;
-        table.guarded = from.guarded;
-        table.moded = from.moded;
-        table.changes_dimension = from.changes_dimension;
-        table.bounded = from.bounded;
-        forward<&Table::mode_count>(table, from);
-        forward<&Table::enabled_in>(table, from);
-        forward<&Table::enabled_at>(table, from);
-        forward<&Table::reset>(table, from);
-        forward<&Table::reset_set>(table, from);
-        forward<&Table::rest>(table, from);
-        forward<&Table::next_time_event>(table, from);
-        forward<&Table::previous_time_event>(table, from);
-        forward<&Table::next_time_event_at>(table, from);
-        forward<&Table::time_event_count>(table, from);
-        forward<&Table::time_reset>(table, from);
-        forward<&Table::lipschitz>(table, from);
-        forward<&Table::speed_bound>(table, from);
-        forward<&Table::acceleration_bound>(table, from);
-        forward<&Table::lower_bound>(table, from);
-        forward<&Table::upper_bound>(table, from);
-        return table;
-    }
-
     std::unique_ptr<RunDoor> callbacks_;
     Table table_;
     FormulaSystem system_;

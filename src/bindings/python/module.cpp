@@ -8,6 +8,7 @@
 #include <exception>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -15,6 +16,7 @@
 
 #include "bindings.hpp"
 #include "callbacks.hpp"
+#include "filippov.hpp"
 #include "formula.hpp"
 #include "ready.hpp"
 #include "ricochet/nn/model.hpp"
@@ -73,6 +75,16 @@ PYBIND11_MODULE(_ricochet, module)
     module.def("callback_system", [](const py::dict& specification) {
         return std::shared_ptr<Source>(std::make_shared<CallbackSource>(specification.ptr()));
     });
+    py::class_<FilippovSource, Source, std::shared_ptr<FilippovSource>>(module, "FilippovSource")
+        .def(py::init([](const std::vector<std::shared_ptr<Source>>& fields, std::size_t surfaces,
+                         bool rated, const std::optional<ricochet::Times>& times,
+                         double restoring_rate) {
+            return std::make_shared<FilippovSource>(
+                std::vector<std::shared_ptr<const Source>>(fields.begin(), fields.end()), surfaces,
+                rated, times, restoring_rate);
+        }))
+        .def("start_mode_at", &FilippovSource::start_mode_at)
+        .def("shares", &FilippovSource::shares);
     using Formulas = std::vector<
         std::pair<std::vector<std::tuple<std::string, std::size_t, std::size_t, double>>,
                   std::vector<std::size_t>>>;

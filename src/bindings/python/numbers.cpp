@@ -180,8 +180,61 @@ void Numbers::read_objects(const Ref& array)
     size_ = converted_.size();
 }
 
+void read_square(PyObject* result, const std::string& who, std::size_t n, double* rows)
+{
+    require_numpy();
+    Ref given = Ref::share(result);
+    if (PyObject_HasAttrString(result, "toarray")) {
+        given = checked(PyObject_CallMethod(result, "toarray", nullptr));
+    }
+    const std::string expected =
+        ", expected an array of shape (" + std::to_string(n) + ", " + std::to_string(n) + ")";
+    const Ref any = given.get() == Py_None
+                        ? Ref()
+                        : Ref::take(PyArray_FromAny(given.get(), nullptr, 0, 0, 0, nullptr));
+    auto* array = reinterpret_cast<PyArrayObject*>(any.get());
+    const bool is_real = array && !PyTypeNum_ISCOMPLEX(PyArray_TYPE(array)) &&
+                         !PyTypeNum_ISFLEXIBLE(PyArray_TYPE(array)) &&
+                         !PyTypeNum_ISDATETIME(PyArray_TYPE(array));
+    const Ref numbers =
+        is_real ? Ref::take(PyArray_FromAny(any.get(), PyArray_DescrFromType(NPY_DOUBLE), 0, 0,
+                                            NPY_ARRAY_CARRAY_RO | NPY_ARRAY_FORCECAST, nullptr))
+                : Ref();
+    if (!numbers) {
+        PyErr_Clear();
+        raise(PyExc_TypeError, who + " returned a " + type_of(result) + expected);
+    }
+    array = reinterpret_cast<PyArrayObject*>(numbers.get());
+    const auto count = static_cast<npy_intp>(n);
+    if (PyArray_NDIM(array) != 2 || PyArray_DIM(array, 0) != count ||
+        PyArray_DIM(array, 1) != count) {
+        const Ref shape = checked(PyObject_GetAttrString(numbers.get(), "shape"));
+        const Ref text = checked(PyObject_Str(shape.get()));
+        raise(PyExc_ValueError,
+              who + " returned the shape " + PyUnicode_AsUTF8(text.get()) + expected);
+    }
+    std::memcpy(rows, PyArray_DATA(array), n * n * sizeof(double));
+}
+
+PyObject* ShownArray::show_list(const State& x)
+{
+    const auto size = static_cast<Py_ssize_t>(x.size());
+    PyObject* list = array_.get();
+    if (!list || Py_REFCNT(list) != 1 || PyList_GET_SIZE(list) != size) {
+        array_ = checked(PyList_New(size));
+        list = array_.get();
+    }
+    for (Py_ssize_t i = 0; i < size; ++i) {
+        PyObject* number = PyFloat_FromDouble(x[static_cast<std::size_t>(i)]);
+        if (!number) throw PythonError();
+        PyList_SetItem(list, i, number);  // takes it, and drops the one that was there
+    }
+    return list;
+}
+
 PyObject* ShownArray::show(const State& x)
 {
+    if (as_list_) return show_list(x);
     require_numpy();
     auto* array = reinterpret_cast<PyArrayObject*>(array_.get());
     const auto size = static_cast<npy_intp>(x.size());

@@ -49,13 +49,23 @@ private:
     Ref kept_;
 };
 
-/// An array that is passed to callbacks. If a callback has kept it, the next call gets another
-/// array, so that the kept one does not change.
+/// Writes a matrix of n x n numbers that a callback has returned, row by row; a sparse one of SciPy
+/// is filled up.
+/// @throws PythonError naming `who` returned something else
+void read_square(PyObject* result, const std::string& who, std::size_t n, double* rows);
+
+/// An array, or a list of floats, that is passed to callbacks. If a callback has kept it, the next
+/// call gets another one, so that the kept one does not change.
 class ShownArray {
 public:
+    explicit ShownArray(bool as_list = false) : as_list_(as_list) {}
+
     [[nodiscard]] PyObject* show(const State& x);
 
 private:
+    [[nodiscard]] PyObject* show_list(const State& x);
+
+    bool as_list_;
     Ref array_;
 };
 

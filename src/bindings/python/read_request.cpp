@@ -21,7 +21,7 @@ namespace {
 [[nodiscard]] MethodName method_of(const std::string& name)
 {
     if (const auto method = method_named(name)) return *method;
-    throw py::value_error("found '" + name + "', expected 'taylor', " +
+    throw py::value_error("found '" + name + "', expected 'taylor', 'rosenbrock4', " +
                           detail::spelled_methods(false, "'"));
 }
 
@@ -91,7 +91,8 @@ void set(Request& request, const py::handle& value)
          [](Request& request, const py::handle& value) {
              const auto name = read_as<std::string>(value);
              request.by_series = name == "taylor";
-             if (!request.by_series) request.method = method_of(name);
+             request.implicit = name == "rosenbrock4";
+             if (!request.by_series && !request.implicit) request.method = method_of(name);
          }},
         {"fixed",
          [](Request& request, const py::handle& value) { request.fixed = read_as<bool>(value); }},
@@ -163,7 +164,8 @@ Request request_from(const py::dict& given)
             throw py::value_error(std::string(name) + ": " + error.what());
         }
     }
-    if (!request.fixed && !request.by_series && !estimates_error(request.method)) {
+    const bool named = !request.by_series && !request.implicit;
+    if (!request.fixed && named && !estimates_error(request.method)) {
         throw py::value_error("method: found '" + std::string(name(request.method)) +
                               "', which has no error estimate, expected fixed=True and a step "
                               "beside it, or " +

@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "implicit.hpp"
 #include "ricochet/simulation.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
@@ -58,14 +59,14 @@ template <class System, class Method>
 class ReadyDoor final : public RunDoor {
 public:
     ReadyDoor(const System& system, std::string_view name)
-        : system_(system, name, watch_), door_(system_, State{})
+        : system_(system, name, watch()), door_(system_, State{})
     {
     }
 
-    void step_by_series(detail::RunSetup<State>& setup) override
+    void choose_method(detail::RunSetup<State>& setup) override
     {
         if constexpr (std::is_same_v<Method, MethodByName>) {
-            RunDoor::step_by_series(setup);
+            RunDoor::choose_method(setup);
         } else {
             detail::step_by_series<Watched<System>, State, Method::components>(setup);
         }
@@ -125,6 +126,11 @@ public:
         constexpr std::size_t components = detail::fixed_size<X>();
         return std::make_unique<ReadyDoor<Driven, detail::TaylorOf<components>>>(system_,
                                                                                  System::name);
+    }
+
+    [[nodiscard]] std::unique_ptr<RunDoor> open_implicit(const State& x0) const override
+    {
+        return implicit_door(open(x0), x0);
     }
 
     [[nodiscard]] std::optional<Record> run_whole(const State& x0, const Request& request,

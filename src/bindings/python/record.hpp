@@ -40,6 +40,8 @@ struct Record {
     std::int64_t guard = -1;
     std::int64_t other_guard = -1;
     Statistics statistics;
+    std::uint64_t jacobians = 0;  ///< of an implicit method
+    std::uint64_t factorizations = 0;
     std::size_t width = 0;  ///< components of the widest state; narrower ones end in NaN
     std::size_t event_count = 0;
     std::vector<double> events;  ///< heads with their states, in units of 8 bytes

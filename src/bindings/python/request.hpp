@@ -18,6 +18,7 @@ struct Request {
     Options options;
     MethodName method = MethodName::dopri5;
     bool by_series = false;  ///< use Taylor's method instead of `method`
+    bool implicit = false;   ///< use Rosenbrock's method instead of `method`
     bool fixed = false;      ///< steps of `options.step`
     std::string_view detector = "extremum";
     std::string_view locator = "newton";
@@ -29,7 +30,7 @@ struct Request {
     [[nodiscard]] bool is_plain() const noexcept
     {
         return detector == "extremum" && locator == "newton" && !fixed && !record_steps && !dense &&
-               !by_series;
+               !by_series && !implicit;
     }
 };
 

@@ -57,8 +57,9 @@ namespace {
 }
 using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64_t)>;
 
-[[nodiscard]] py::object statistics_of(const Statistics& s)
+[[nodiscard]] py::object statistics_of(const Record& record)
 {
+    const Statistics& s = record.statistics;
     static const auto& space =
         *new py::object(py::module_::import("types").attr("SimpleNamespace"));
     using namespace py::literals;
@@ -73,6 +74,8 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     add("unresolved_steps", s.unresolved_steps);
     add("resteps", s.resteps);
     add("flow_calls", s.flow_calls);
+    add("jacobians", record.jacobians);
+    add("factorizations", record.factorizations);
     add("guard_calls", s.guard_calls);
     add("checks_deferred", s.checks_deferred);
     add("checks_put_off", s.checks_deferred);  // its name before version 0.2
@@ -158,12 +161,13 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         bytes_of(r.times), bytes_of(r.states), r.wrong_bound,
         r.solution ? py::object(pickled(PySolution{r.solution})) : py::object(py::none()),
         self.modes, self.guard_names, r.reason, r.armed_beyond, pickled(r.phases),
-        bytes_of(r.reaction), bytes_of(r.reactions), r.armed_on_surface);
+        bytes_of(r.reaction), bytes_of(r.reactions), r.armed_on_surface, r.jacobians,
+        r.factorizations);
 }
 
 [[nodiscard]] PyRun run_from(const py::tuple& state)
 {
-    if (state.size() != 22) throw py::value_error("found a pickle of another version");
+    if (state.size() != 24) throw py::value_error("found a pickle of another version");
     PyRun out;
     Record& r = out.record;
     r.outcome = static_cast<Outcome>(py::cast<int>(state[0]));
@@ -196,6 +200,8 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     r.reaction = numbers_of(state[19]);
     r.reactions = numbers_of(state[20]);
     r.armed_on_surface = py::cast<std::vector<std::size_t>>(state[21]);
+    r.jacobians = py::cast<std::uint64_t>(state[22]);
+    r.factorizations = py::cast<std::uint64_t>(state[23]);
     if (!r.times.empty()) r.reaction_width = r.reactions.size() / r.times.size();
     return out;
 }
@@ -427,7 +433,7 @@ void bind_results(py::module_& module)
         .def_readonly("modes", &PyRun::modes, "What the modes are called, or None.")
         .def_readonly("guard_names", &PyRun::guard_names, "What the guards are called.")
         .def_property_readonly(
-            "statistics", [](const PyRun& self) { return statistics_of(self.record.statistics); },
+            "statistics", [](const PyRun& self) { return statistics_of(self.record); },
             "What the run did, counted; its evidence says why steps were taken to hold no event.")
         .def_property_readonly(
             "events",

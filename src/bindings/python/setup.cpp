@@ -12,6 +12,7 @@
 #include "ricochet/extremum.hpp"
 #include "ricochet/locators.hpp"
 #include "ricochet/planned.hpp"
+#include "ricochet/rosenbrock.hpp"
 #include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::python {
@@ -72,6 +73,7 @@ void detect_without_gate(detail::RunSetup<State>& setup, const Request& request)
 
 std::unique_ptr<RunDoor> open_for(const Request& request, const Source& source, const State& x0)
 {
+    if (request.implicit) return source.open_implicit(x0);
     return request.by_series ? source.open_by_series(x0) : source.open(x0);
 }
 
@@ -83,9 +85,10 @@ RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunDoor& door,
         return;
     }
 #ifdef RICOCHET_WITH_NONSMOOTH
-    if (request.fixed || request.by_series || !estimates_error(request.method)) {
+    if (request.fixed || request.by_series || request.implicit ||
+        !estimates_error(request.method)) {
         throw std::invalid_argument(
-            "set_valued: found fixed steps or the method 'taylor' beside it, expected " +
+            "set_valued: found fixed steps, 'taylor' or 'rosenbrock4' beside it, expected " +
             detail::spelled_methods(true, "'") + " with error control");
     }
     const bool checks = request.detector == "extremum" || request.detector == "ends" ||
@@ -115,9 +118,13 @@ OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door
     setup.cancels_by_itself = true;
     if (!detect_by_gate(out, request, source, door)) detect_without_gate(setup, request);
     if (request.by_series) {
-        door.step_by_series(setup);
+        door.choose_method(setup);
         setup.stepping = request.fixed ? detail::written_type<FixedStep<Taylor>>()
                                        : detail::written_type<ErrorControlled<Taylor>>();
+    } else if (request.implicit) {
+        door.choose_method(setup);
+        setup.stepping = request.fixed ? detail::written_type<FixedStep<Rosenbrock4>>()
+                                       : detail::written_type<ErrorControlled<Rosenbrock4>>();
     } else {
         setup.kernel = &detail::kernel_by_name<State>(request.method, 0);
         setup.method_by_name = true;

@@ -57,6 +57,37 @@ void drive(Loop& loop, StepEnds<State>* kept)
     }
 }
 
+/// The ends of all steps of a run that has kept its solution, as `drive` collects them.
+[[nodiscard]] StepEnds<State> step_ends_of(const Run<State>& run)
+{
+    StepEnds<State> out;
+    Trajectory<State>& steps = out.states;
+    const auto push = [&](double t, const State& x) {
+        if (x.empty() || (!steps.t.empty() && steps.t.back() == t && steps.x.back() == x)) return;
+        steps.t.push_back(t);
+        steps.x.push_back(x);
+    };
+    const auto& solution = run.solution;
+    const bool backward = !solution.empty() && run.t < solution.time(0);
+    std::size_t next = 0;
+    const auto push_both_sides = [&](double t, const State& after) {
+        bool seen = false;
+        for (; next < run.events.size(); ++next) {
+            const auto& event = run.events[next];
+            if (backward ? event.t < t : event.t > t) break;
+            if (seen || event.t != t || event.before == event.after) continue;
+            push(t, event.before);
+            seen = true;
+        }
+        push(t, after);
+    };
+    for (std::size_t k = 0; k < solution.size(); ++k) {
+        push_both_sides(solution.time(k), solution(solution.time(k)));
+    }
+    push_both_sides(run.t, run.x);
+    return out;
+}
+
 /// Calls `work`, without the interpreter lock if `freely` is set.
 template <class Work>
 void work_freely(bool freely, const Work& work)
@@ -78,6 +109,16 @@ void work_freely(bool freely, const Work& work)
     record.x = x0;
     record.width = x0.size();
     record.mode = options.mode;
+    return record;
+}
+
+/// Adds what an implicit method has done.
+[[nodiscard]] Record with_counts(Record record, RunDoor& door)
+{
+    const ImplicitCounts& counts = door.implicit();
+    record.jacobians = counts.jacobians;
+    record.factorizations = counts.factorizations;
+    record.statistics.flow_calls += counts.flow_calls;
     return record;
 }
 
@@ -109,10 +150,11 @@ PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& r
         loop = RunLoop(request, owned, *door, x0);
         work_freely(door->is_free(), [&] { drive(*loop, kept); });
     } catch (const PythonError& error) {
-        out.record = loop ? record_of(loop->finish(), kept) : start_of(x0, request.options);
+        out.record = loop ? with_counts(record_of(loop->finish(), kept), *door)
+                          : start_of(x0, request.options);
         raise_with(error, std::move(out));
     }
-    out.record = record_of(loop->finish(), kept);
+    out.record = with_counts(record_of(loop->finish(), kept), *door);
     if (door->watch().raised()) raise_with(*door->watch().raised(), std::move(out));
     return out;
 }
@@ -187,6 +229,7 @@ public:
     {
         Request request = request_from(given);
         if (!given.contains("mode")) request.options.mode = source_->start_mode();
+        record_steps_ = request.record_steps;
         door_ = open_for(request, *source_, x0);
         request.options.cancelled = door_->watch().cancelled();
         setup_ = setup_for(request, *source_, *door_);
@@ -217,7 +260,7 @@ public:
         const Turn turn(in_use_, "Simulation");
         if (!finished_) {
             finished_.emplace(names_);
-            finished_->record = record_of(Run<State>(loop_->bring_up_to_date()));
+            finished_->record = recorded(loop_->bring_up_to_date());
             may_go_on_ = true;
         }
         return *finished_;
@@ -227,7 +270,7 @@ public:
         const Turn turn(in_use_, "Simulation");
         if (!finished_) {
             finished_.emplace(names_);
-            finished_->record = record_of(loop_->finish());
+            finished_->record = recorded(loop_->finish());
         }
         may_go_on_ = false;
         return *finished_;
@@ -282,7 +325,7 @@ public:
         run.x = loop_->x();
         run.mode = loop_->mode();
         if (!loop_->ended()) run.outcome = Outcome::cancelled;
-        out.record = record_of(std::move(run));
+        out.record = recorded(std::move(run));
         return out;
     }
 
@@ -333,10 +376,17 @@ private:
         may_go_on_ = false;
     }
 
+    [[nodiscard]] Record recorded(Run<State> run)
+    {
+        if (!record_steps_) return with_counts(record_of(std::move(run)), *door_);
+        const StepEnds<State> steps = step_ends_of(run);
+        return with_counts(record_of(std::move(run), &steps), *door_);
+    }
+
     [[noreturn]] void end_with(const PythonError& error)
     {
         finished_.emplace(names_);
-        finished_->record = record_of(loop_->finish());
+        finished_->record = recorded(loop_->finish());
         raise_with(error, PyRun(*finished_));
     }
 
@@ -346,6 +396,7 @@ private:
     OwnedSetup setup_;
     RunLoop loop_;
     std::optional<PyRun> finished_;
+    bool record_steps_ = false;
     bool may_go_on_ = false;  ///< it has been run to its end, but its loop is still there
     std::atomic<bool> in_use_ = false;
 };

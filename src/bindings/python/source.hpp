@@ -10,6 +10,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -57,6 +58,13 @@ private:
     std::optional<PythonError> raised_;
 };
 
+/// What an implicit method has done beside its steps.
+struct ImplicitCounts {
+    std::uint64_t jacobians = 0;
+    std::uint64_t factorizations = 0;
+    std::uint64_t flow_calls = 0;  ///< for differences, which the loop does not count
+};
+
 /// The door of one run to its system.
 class RunDoor {
 public:
@@ -70,11 +78,20 @@ public:
     /// Whether none of the system's functions needs the interpreter.
     [[nodiscard]] virtual bool is_free() const noexcept = 0;
 
-    /// Lets a run at this door, whose detector is known, take its steps by Taylor's method.
-    virtual void step_by_series(detail::RunSetup<State>& /*setup*/)
+    /// Lets a run at this door, whose detector is known, take its steps by the method for which the
+    /// door was opened.
+    virtual void choose_method(detail::RunSetup<State>& /*setup*/)
     {
-        throw std::logic_error("a door that is not opened for steps by series");
+        throw std::logic_error("a door that is not opened for a method of its own");
     }
+
+    /// Writes the derivatives of the flow by the state, row by row; false where they are not known.
+    virtual bool jacobian(Mode /*mode*/, double /*t*/, const State& /*x*/,
+                          std::span<double> /*rows*/)
+    {
+        return false;
+    }
+    [[nodiscard]] virtual ImplicitCounts& implicit() noexcept { return implicit_; }
 
     /// Whether the system has set-valued motion.
     [[nodiscard]] virtual bool has_inclusion() const noexcept { return false; }
@@ -85,10 +102,14 @@ public:
         throw std::logic_error("a door to a system without set-valued motion");
     }
 
-    [[nodiscard]] virtual SignalWatch& watch() noexcept { return watch_; }
+    [[nodiscard]] virtual SignalWatch& watch() noexcept { return *watch_; }
+    /// Lets signals be handled by the watch of another door, which must outlive this one.
+    void share_watch(SignalWatch& watch) noexcept { watch_ = &watch; }
 
-protected:
-    SignalWatch watch_;
+private:
+    SignalWatch own_watch_;
+    SignalWatch* watch_ = &own_watch_;
+    ImplicitCounts implicit_;
 };
 
 class Source {
@@ -110,6 +131,12 @@ public:
             "method: found 'taylor', which needs the flow as a formula, for functions of Python; "
             "expected a ready system, a system with formula=n, or another method, such as "
             "'fehlberg78'");
+    }
+
+    /// The same for steps by Rosenbrock's method.
+    [[nodiscard]] virtual std::unique_ptr<RunDoor> open_implicit(const State& /*x0*/) const
+    {
+        throw std::invalid_argument("method: found 'rosenbrock4' for a system without it");
     }
 
     /// The whole run by a loop made for this system, if there is one for such a request. Does not

@@ -88,6 +88,36 @@ private:
         int k, lo, hi;
     };
 
+    // Of a short tape operations are computed one by one, each with its coefficients in a row.
+
+    enum class Step : std::uint8_t {
+        sum,
+        difference,
+        negative,
+        copy,
+        times,
+        combination,
+        slope,
+        product,
+        square,
+        quotient,
+        constant_over,
+        square_root,
+        function,  ///< exp, sin, sinh, cosh
+        cosine,    ///< the same with the opposite sign
+        tangent,   ///< with a_k before it
+        hyperbolic_tangent,
+    };
+    struct Instruction {
+        Step step{};
+        bool for_guards = false;
+        int degree = 0;                  ///< of the result
+        int degree_a = 0, degree_b = 0;  ///< of the operands
+        std::uint32_t out = 0, a = 0, b = 0;
+        std::uint32_t first = 0, count = 0;  ///< of the terms of a combination
+        double factor = 0;
+    };
+
     void simplify(const Recording& recording);
     [[nodiscard]] int repeated(TapeOp& op, double& constant) const;
     void add_partners();
@@ -101,6 +131,12 @@ private:
     void side_by_side(Batch& batch);
     [[nodiscard]] std::size_t in_a_row(const std::vector<std::size_t>& places, bool late);
     [[nodiscard]] std::size_t slopes_of(std::size_t first, std::size_t count, bool late);
+
+    void write_program();
+    [[nodiscard]] bool append(const Batch& batch, std::vector<std::uint32_t>& sources);
+    int run_program(double t, const double* x, const TaylorCoefficients<double>& to, int order);
+    void run_row(int k, bool guards_alone);
+    [[nodiscard]] double combined(const Instruction& of, int k) const noexcept;
 
     void start(double t, const double* x);
     [[nodiscard]] double begin(std::size_t i);
@@ -146,6 +182,9 @@ private:
     std::vector<double> factors_;   ///< constants by place
     std::vector<double> inverses_;  ///< by place
     std::vector<double> sums_, other_sums_;
+    std::vector<Instruction> program_;  ///< empty: operations are computed side by side
+    std::vector<Term> program_terms_;   ///< places of operands, and factors
+    std::vector<double> columns_;       ///< coefficients of each place, one after the other
     int degree_ = no_degree;
     bool finite_ = true;
 };

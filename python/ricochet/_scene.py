@@ -1,0 +1,270 @@
+"""Scenes of many bodies in a plane, from impact to impact."""
+
+import os
+from enum import IntEnum
+from types import SimpleNamespace
+
+import numpy as np
+
+from ._numbers import meant_by, number_from, numbers_from
+
+
+def _scenes():
+    from importlib import import_module
+    try:
+        return import_module("._scenes", __package__)
+    except ModuleNotFoundError as error:
+        raise ImportError(
+            "ricochet: found a package without scenes, expected the module ricochet._scenes: build "
+            "it with the CMake option RICOCHET_SCENE") from error
+
+
+class SceneKind(IntEnum):
+    """Kind of an event of a scene: the field ``kind`` of ``run.events``.
+
+    IMPACT : two bodies, or a body and a surface, have struck each other
+    HELD : impacts on a surface have accumulated, and the body slides or rests on it
+    STOPPED : friction has stopped a sliding body
+    JOINED : lasting contact: the body is advanced in a group
+    RELEASED : the body has left its group
+    SLEPT : the group of the body has come to rest
+    """
+
+    IMPACT = 0
+    HELD = 1
+    STOPPED = 2
+    JOINED = 3
+    RELEASED = 4
+    SLEPT = 5
+
+    def __str__(self):
+        return self.name
+
+
+_EVENT = np.dtype([("t", "f8"), ("number", "u8"), ("kind", "u1"), ("body", "i8"), ("other", "i8"),
+                   ("surface", "?"), ("impulse", "f8", 2), ("before", "f8", (2, 2)),
+                   ("after", "f8", (2, 2))])
+
+
+def _pair(given, what):
+    pair = numbers_from(given, what)
+    if pair.shape != (2,):
+        raise ValueError(f"{what}: found shape {pair.shape}, expected two numbers")
+    return pair.tolist()
+
+
+def _text(given):
+    if given is None:
+        return ""
+    if not isinstance(given, str):
+        raise TypeError(f"name: found {given!r}, expected a text")
+    return given
+
+
+class SceneRun:
+    """Result of a run of a scene, in m, s, kg, N s and J.
+
+    outcome, message, success : str, str, bool
+        How the run ended; a sentence on what ended it, empty at the end; whether it reached its end.
+    involved : list of int
+        The bodies that the message is about.
+    t : float
+        Time that all bodies have reached.
+    positions, velocities, asleep : ndarray, shapes (bodies, 2), (bodies, 2) and (bodies,)
+        There; ``asleep``: at rest until struck.
+    times, trajectory, trajectory_velocities, trajectory_asleep : ndarray
+        ``sample_times`` that were reached, and the states there, shapes (times, bodies, 2) and
+        (times, bodies).
+    energy : ndarray, shape (times,)
+        At ``times``, kinetic and of gravity and springs; ``energy_at_end`` at ``t``.
+    events : ndarray, shape (events,)
+        A structured array: ``t``; ``number``, equal for the contacts of one cluster; ``kind``, a
+        `SceneKind`; ``body``; ``other``, a body or, where ``surface`` is set, a surface; ``impulse``
+        on ``body``; ``before`` and ``after``, the velocities of both.
+    body_names, surface_names : list of str
+    statistics : namespace
+        Counts, such as ``impacts`` and ``steps``.
+    """
+
+    def __init__(self, scene, found):
+        self.outcome, self.message = found["outcome"], found["message"]
+        self.success = self.outcome == "reached_end"
+        self.involved = found["involved"].tolist()
+        self.t = found["t"]
+        last = found["last"]
+        self.positions, self.velocities, self.asleep = (rows[0] for rows in last)
+        self.times = found["times"]
+        self.trajectory, self.trajectory_velocities, self.trajectory_asleep = found["samples"]
+        columns = found["events"]
+        self.events = np.empty(len(columns["t"]), _EVENT)
+        for name, column in columns.items():
+            self.events[name] = column
+        self.energy = scene.energy(self.trajectory, self.trajectory_velocities)
+        self.energy_at_end = float(scene.energy(*last[:2])[0])
+        self.body_names, self.surface_names = scene.body_names, scene.surface_names
+        self.statistics = SimpleNamespace(**found["statistics"])
+
+    def __repr__(self):
+        return (f"<SceneRun: {self.outcome} at t = {self.t!r}, {len(self.body_names)} bodies, "
+                f"{self.statistics.events} events>")
+
+
+class Scene:
+    """Discs and points in a plane, with walls, terrain and springs; each body has its own clock.
+
+    The plane is vertical with gravity, horizontal without. Discs do not spin: friction acts at their
+    centres. Lengths are in m, times in s, masses in kg.
+
+    Parameters
+    ----------
+    gravity : (float, float)
+        [m/s^2] Default (0, 0).
+    memory_limit : float
+        [bytes] A scene that would need more in a run is refused. Default 4e9.
+    """
+
+    def __init__(self, gravity=(0.0, 0.0), *, memory_limit=4e9):
+        self._scene = _scenes().Scene(_pair(gravity, "gravity"),
+                                      number_from(memory_limit, "memory_limit"))
+        self._materials = {None: 0}
+
+    @classmethod
+    def _of(cls, scene):
+        out = cls.__new__(cls)
+        named = {name: i for i, name in enumerate(scene.material_names) if name}
+        out._scene, out._materials = scene, {None: 0, **named}
+        return out
+
+    @classmethod
+    def from_json(cls, text, name="scene"):
+        """Reads the scene that ``text`` describes, with the options of its ``"run"``.
+
+        ValueError, with ``name`` and the line, where it is not one.
+        """
+        if not isinstance(text, str):
+            raise TypeError(f"text: found a {type(text).__name__}, expected a text; Scene.load reads "
+                            "files")
+        return cls._of(_scenes().read_scene(text, name))
+
+    @classmethod
+    def load(cls, path):
+        """Reads a scene from a JSON file; ValueError also where the file cannot be read."""
+        return cls._of(_scenes().load_scene(os.fspath(path)))
+
+    def material(self, name, *, restitution=1.0, friction=0.0):
+        """Adds a material, by whose name bodies and surfaces refer to it.
+
+        At a contact the smaller restitution, in [0, 1], and the smaller coefficient of friction apply.
+        Without a material a body is elastic and smooth.
+        """
+        if not isinstance(name, str) or not name:
+            raise TypeError(f"name: found {name!r}, expected a text")
+        self._materials[name] = self._scene.material(
+            name, number_from(restitution, "restitution"), number_from(friction, "friction"))
+
+    def _material(self, name):
+        if name not in self._materials:
+            known = [each for each in self._materials if each is not None]
+            raise ValueError(f"material: found {name!r}, expected some of {meant_by(name, known)}")
+        return self._materials[name]
+
+    def disc(self, at, *, radius=1.0, mass=1.0, velocity=(0.0, 0.0), drag=0.0, material=None,
+             name=None):
+        """Adds a disc with its centre ``at`` (x, y), and returns its number among the bodies.
+
+        ``drag`` [kg/s] is the d of a force -d velocity.
+        """
+        return self._scene.disc(_text(name), _pair(at, "at"), _pair(velocity, "velocity"),
+                                number_from(radius, "radius"), number_from(mass, "mass"),
+                                number_from(drag, "drag"), self._material(material))
+
+    def point(self, at, *, mass=1.0, velocity=(0.0, 0.0), drag=0.0, material=None, name=None):
+        """Adds a body without extension, and returns its number; two points never meet."""
+        return self._scene.point(_text(name), _pair(at, "at"), _pair(velocity, "velocity"),
+                                 number_from(mass, "mass"), number_from(drag, "drag"),
+                                 self._material(material))
+
+    def wall(self, point, normal, *, material=None, motion=None, name=None):
+        """Adds a wall through ``point``, whose ``normal`` points towards the bodies.
+
+        Returns its number among the surfaces. ``motion`` is a dictionary:
+        ``{"amplitude": (x, y), "frequency": hertz, "phase": rad}``, ``{"velocity": (x, y), "since":
+        t}``, ``{"times": [...], "displacements": [(x, y), ...]}``, or functions of t that return
+        pairs, ``{"displacement": f, "velocity": df, "acceleration_bound": a}``, also with
+        ``speed_bound`` and ``reach``.
+        """
+        return self._scene.wall(_text(name), _pair(point, "point"), _pair(normal, "normal"),
+                                self._material(material), motion)
+
+    def terrain(self, points, *, closed=False, material=None, motion=None, name=None):
+        """Adds a chain of segments between ``points``, shape (n, 2), which is met from both sides.
+
+        ``closed``: the last point is joined to the first. Returns its number among the surfaces.
+        """
+        ends = numbers_from(points, "points")
+        if ends.ndim != 2 or ends.shape[1] != 2:
+            raise ValueError(f"points: found shape {ends.shape}, expected (n, 2)")
+        return self._scene.terrain(_text(name), ends.tolist(), bool(closed),
+                                   self._material(material), motion)
+
+    def _number(self, body):
+        if isinstance(body, str):
+            return self._scene.body(body)
+        count = len(self._scene.body_names)
+        if isinstance(body, bool) or not isinstance(body, (int, np.integer)) or not 0 <= body < count:
+            raise ValueError(f"spring: found {body!r}, expected the name of a body, or a number below "
+                             f"{count}")
+        return int(body)
+
+    def spring(self, first, second, *, stiffness, rest=0.0, damping=0.0):
+        """Adds a spring between two bodies, by number or name.
+
+        Its tension is stiffness (length - rest) + damping d(length)/dt.
+        """
+        self._scene.spring(self._number(first), self._number(second), number_from(rest, "rest"),
+                           number_from(stiffness, "stiffness"), number_from(damping, "damping"))
+
+    @property
+    def body_names(self):
+        """Names of the bodies, by number."""
+        return self._scene.body_names
+
+    @property
+    def surface_names(self):
+        """Names of walls and terrain, by number."""
+        return self._scene.surface_names
+
+    @property
+    def radii(self):
+        """Radii of the bodies [m], shape (bodies,); 0 for points."""
+        return self._scene.radii
+
+    @staticmethod
+    def _options(t_end, options):
+        if t_end is not None:
+            options["t_end"] = number_from(t_end, "t_end")
+        if options.get("sample_times") is not None:
+            options["sample_times"] = numbers_from(options["sample_times"], "sample_times").tolist()
+        return {name: value for name, value in options.items() if value is not None}
+
+    def simulate(self, t_end=None, **options):
+        """Runs the scene to ``t_end``, by default that of its file, and returns a `SceneRun`.
+
+        Options: ``t_start``, ``sample_times``, ``rtol`` and ``atol`` (of bodies with springs or
+        drag), ``impacts`` ("waves", or "together": Newton's law for all contacts of a cluster at once),
+        ``elastic_within`` [s], ``contact_step`` [s] (of groups in lasting contact), ``record_events``,
+        ``max_events``. ValueError for a scene that cannot start, naming the bodies that overlap.
+        """
+        return SceneRun(self, self._scene.simulate(self._options(t_end, options)))
+
+    def explain(self, t_end=None, **options):
+        """Says how the scene would be run, as a text; nothing is simulated."""
+        return self._scene.explain(self._options(t_end, options))
+
+    def energy(self, positions, velocities):
+        """Energy [J] of states of all bodies, shape (times,) of two arrays (times, bodies, 2)."""
+        return self._scene.energy(numbers_from(positions, "positions"),
+                                  numbers_from(velocities, "velocities"))
+
+    def __repr__(self):
+        return f"<Scene: {len(self.body_names)} bodies, {len(self.surface_names)} surfaces>"

@@ -1,0 +1,221 @@
+// Steps by Rosenbrock's method, for stiff systems.
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "formula_door.hpp"
+#include "forwarding.hpp"
+#include "implicit.hpp"
+#include "ricochet/rosenbrock.hpp"
+#include "source.hpp"
+
+namespace ricochet::python {
+
+namespace {
+
+/// Length of a difference at x, as in rosenbrock.hpp: it changes x however large x is.
+[[nodiscard]] double reach_of(double x) noexcept
+{
+    constexpr double epsilon = std::numeric_limits<double>::epsilon();
+    const double size = std::fabs(x);
+    return std::max(std::sqrt(epsilon * std::max(1e-5, size)), 4 * epsilon * size);
+}
+
+/// Forward differences along the flow, which exists ahead of the state.
+void jacobian_by_differences(RunDoor& of, Mode mode, double t, const State& x,
+                             std::span<double> rows)
+{
+    const std::size_t n = x.size();
+    State here(n), there(n), moved = x;
+    const auto flow = [&](const State& at, State& rate) {
+        ++of.implicit().flow_calls;
+        of.table().flow(of.door(), mode, t, at, rate);
+    };
+    flow(x, here);
+    for (std::size_t j = 0; j < n; ++j) {
+        moved[j] = x[j] + std::copysign(reach_of(x[j]), here[j]);
+        const double delta = moved[j] - x[j];
+        flow(moved, there);
+        for (std::size_t i = 0; i < n; ++i) rows[i * n + j] = (there[i] - here[i]) / delta;
+        moved[j] = x[j];
+    }
+}
+
+/// The flow behind a door, with its Jacobian: the caller's, or differences.
+class ImplicitSystem {
+public:
+    static constexpr bool unchecked_names = true;
+    using State = python::State;
+
+    explicit ImplicitSystem(RunDoor& callbacks)
+        : name(callbacks.table().name(callbacks.door())), callbacks_(&callbacks)
+    {
+    }
+
+    std::string name;
+
+    [[nodiscard]] RunDoor& callbacks() const noexcept { return *callbacks_; }
+    [[nodiscard]] std::size_t mode_count() const
+    {
+        return callbacks_->table().mode_count(callbacks_->door());
+    }
+    void flow(Mode mode, double t, const State& x, State& dxdt) const
+    {
+        callbacks_->table().flow(callbacks_->door(), mode, t, x, dxdt);
+    }
+    void jacobian(Mode mode, double t, const State& x, std::span<double> rows) const
+    {
+        ++callbacks_->implicit().jacobians;
+        if (callbacks_->jacobian(mode, t, x, rows)) return;
+        jacobian_by_differences(*callbacks_, mode, t, x, rows);
+    }
+
+private:
+    RunDoor* callbacks_;
+};
+
+/// The kernel of the method, whose factorizations are counted at the door of the caller's system.
+template <class System>
+class CountedKernel {
+    using Step = detail::StepState<State>;
+    using Kernel = detail::StepKernel<State>;
+    using Door = detail::StepperDoor<System, State, Rosenbrock4>;
+
+    static constexpr Kernel plain = detail::KernelOf<System, State, Rosenbrock4>::make();
+
+    /// Counts what one call of the kernel factorizes. That is one matrix at most: where the call
+    /// has computed another Jacobian, or the factors are of another length of step.
+    class Count {
+    public:
+        explicit Count(void* door)
+            : of_(*static_cast<Door*>(static_cast<detail::Door<System, State>*>(door))),
+              counts_(of_.system().callbacks().implicit()),
+              length_(of_.room.factored),
+              jacobians_(counts_.jacobians)
+        {
+        }
+        Count(const Count&) = delete;
+        Count& operator=(const Count&) = delete;
+        ~Count()
+        {
+            const bool is_new = counts_.jacobians != jacobians_ || of_.room.factored != length_;
+            counts_.factorizations += is_new && std::isfinite(of_.room.factored);
+        }
+
+    private:
+        Door& of_;
+        ImplicitCounts& counts_;
+        double length_;
+        std::uint64_t jacobians_;
+    };
+
+    static bool take(void* door, Step& step, double h)
+    {
+        const Count count(door);
+        return plain.take(door, step, h);
+    }
+    static double attempt(void* door, Step& step, double h, double rtol, double atol)
+    {
+        const Count count(door);
+        return plain.attempt(door, step, h, rtol, atol);
+    }
+    static void depart(void* door, Step& step, double s, State& w, State& rate)
+    {
+        const Count count(door);
+        plain.depart(door, step, s, w, rate);
+    }
+    static bool sample(void* door, Step& step, double s, double rtol, double atol, State& w)
+    {
+        const Count count(door);
+        return plain.sample(door, step, s, rtol, atol, w);
+    }
+    static double roughness(void* door, Step& step, double rtol, double atol)
+    {
+        const Count count(door);
+        return plain.roughness(door, step, rtol, atol);
+    }
+
+    [[nodiscard]] static constexpr Kernel make()
+    {
+        Kernel kernel = plain;
+        kernel.take = &take;
+        kernel.attempt = &attempt;
+        kernel.depart = &depart;
+        kernel.sample = &sample;
+        kernel.roughness = &roughness;
+        return kernel;
+    }
+
+public:
+    static const Kernel& counted()
+    {
+        static constexpr Kernel kernel = make();
+        return kernel;
+    }
+};
+
+/// The door of a run by this method to functions of Python, or to a ready system.
+class ImplicitDoor final : public RunDoor {
+public:
+    ImplicitDoor(std::unique_ptr<RunDoor> callbacks, const State& x0)
+        : callbacks_(std::move(callbacks)), system_(*callbacks_), door_(system_, x0)
+    {
+        Forwarding<ImplicitSystem>::all(table_, callbacks_->table());
+    }
+
+    [[nodiscard]] const detail::SystemTable<State>& table() const noexcept override
+    {
+        return table_;
+    }
+    [[nodiscard]] void* door() noexcept override
+    {
+        return static_cast<detail::Door<ImplicitSystem, State>*>(&door_);
+    }
+    [[nodiscard]] bool is_free() const noexcept override { return callbacks_->is_free(); }
+    void choose_method(detail::RunSetup<State>& setup) override
+    {
+        setup.kernel = &CountedKernel<ImplicitSystem>::counted();
+    }
+    [[nodiscard]] bool has_inclusion() const noexcept override
+    {
+        return callbacks_->has_inclusion();  // which is refused beside this method
+    }
+    [[nodiscard]] SignalWatch& watch() noexcept override { return callbacks_->watch(); }
+    [[nodiscard]] ImplicitCounts& implicit() noexcept override { return callbacks_->implicit(); }
+
+private:
+    std::unique_ptr<RunDoor> callbacks_;
+    detail::SystemTable<State> table_;
+    ImplicitSystem system_;
+    detail::StepperDoor<ImplicitSystem, State, Rosenbrock4> door_;
+};
+
+}  // namespace
+
+template <>
+void FormulaDoor<Rosenbrock4>::choose_method(detail::RunSetup<State>& setup)
+{
+    setup.kernel = &CountedKernel<FormulaSystem>::counted();
+}
+
+std::unique_ptr<RunDoor> implicit_door(std::unique_ptr<RunDoor> callbacks, const State& x0)
+{
+    return std::make_unique<ImplicitDoor>(std::move(callbacks), x0);
+}
+
+std::unique_ptr<RunDoor> implicit_formula_door(std::unique_ptr<RunDoor> callbacks,
+                                               const ModedFormula& flow,
+                                               std::vector<const ModedFormula*> guards,
+                                               const State& x0)
+{
+    return std::make_unique<FormulaDoor<Rosenbrock4>>(std::move(callbacks), flow, std::move(guards),
+                                                      x0);
+}
+
+}  // namespace ricochet::python

@@ -1,0 +1,214 @@
+// The coefficients of short tapes: operations one by one, in the order and with the bits of those
+// that are computed side by side, whose passes over few lanes cost more than what they compute.
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <numeric>
+#include <vector>
+
+#include "ricochet/taylor/detail/lazy_tape.hpp"
+#include "ricochet/taylor/detail/taylor_sums.hpp"
+
+namespace ricochet::detail {
+
+namespace {
+
+/// Number of operations up to which a program takes no longer (measured with flows of 8, 9, 16 and
+/// more operations: at 9 it saves a seventh, at 16 it costs a tenth).
+constexpr std::size_t most_program_operations = 10;
+
+/// Distance of two places in the columns: a column ends with a coefficient beyond the last order.
+constexpr std::size_t stride = 24;
+static_assert(stride > most_taylor_order + 1);
+
+/// sum of a_j b_{k-j} for j from lo to hi
+[[gnu::always_inline]] inline double convolved(const double* a, const double* b, int k, int lo,
+                                               int hi) noexcept
+{
+    if (hi < lo) return 0;
+    return reversed_products[static_cast<std::size_t>(hi - lo)](a + lo, b + (k - lo));
+}
+
+/// sum of a_j a_{k-j} for j from lo to k - lo
+[[gnu::always_inline]] inline double squared(const double* a, int k, int lo) noexcept
+{
+    const double twice = 2 * convolved(a, a, k, lo, (k - 1) / 2);
+    return k % 2 == 0 && lo <= k / 2 ? twice + a[k / 2] * a[k / 2] : twice;
+}
+
+}  // namespace
+
+/// Writes the program of the batches, if it can have one.
+void LazyTape::write_program()
+{
+    program_.clear();
+    program_terms_.clear();
+    if (operations() > most_program_operations) return;
+    // Where the operand of a pass is read that takes a copy of it.
+    std::vector<std::uint32_t> sources(width_);
+    std::iota(sources.begin(), sources.end(), 0U);
+    for (const auto* passes : {&batches_, &late_}) {
+        for (const Batch& batch : *passes) {
+            if (batch.pass != Pass::copy) continue;
+            for (std::size_t l = 0; l < batch.lanes.size(); ++l) {
+                sources[batch.first + l] = batch.lanes[l].a;
+            }
+        }
+    }
+    for (const auto* passes : {&batches_, &late_}) {
+        for (const Batch& batch : *passes) {
+            if (append(batch, sources)) continue;
+            program_.clear();
+            return;
+        }
+    }
+    columns_.assign(width_ * stride, 0);
+}
+
+/// Appends the instructions of a batch; false if there is none for its operation.
+bool LazyTape::append(const Batch& batch, std::vector<std::uint32_t>& sources)
+{
+    if (batch.pass == Pass::copy) return true;
+    Instruction each{.for_guards = batch.for_guards,
+                     .degree = batch.degree,
+                     .degree_a = batch.degree_a,
+                     .degree_b = batch.degree_b};
+    bool by_lanes = true;  // operands are places of lanes, rather than side by side
+    std::size_t a = batch.a, b = batch.b;
+    if (batch.pass == Pass::slope) {
+        each.step = Step::slope;
+    } else if (batch.pass == Pass::combination) {
+        each.step = Step::combination;
+    } else {
+        switch (batch.op) {
+            case TaylorOp::input:
+            case TaylorOp::constant: return true;
+            case TaylorOp::sum: each.step = Step::sum; break;
+            case TaylorOp::difference: each.step = Step::difference; break;
+            case TaylorOp::negative:
+            case TaylorOp::constant_minus: each.step = Step::negative; break;
+            case TaylorOp::plus_constant:
+            case TaylorOp::minus_constant: each.step = Step::copy; break;
+            case TaylorOp::times_constant:
+            case TaylorOp::over_constant: each.step = Step::times; break;
+            default: by_lanes = false;
+        }
+    }
+    if (!by_lanes) {
+        switch (batch.op) {
+            case TaylorOp::product: each.step = Step::product; break;
+            case TaylorOp::square: each.step = Step::square; break;
+            case TaylorOp::quotient: each.step = Step::quotient; break;
+            case TaylorOp::constant_over: each.step = Step::constant_over; break;
+            case TaylorOp::square_root: each.step = Step::square_root; break;
+            case TaylorOp::exponential: b = batch.first; [[fallthrough]];
+            case TaylorOp::sine:
+            case TaylorOp::hyperbolic_sine:
+            case TaylorOp::hyperbolic_cosine: each.step = Step::function; break;
+            case TaylorOp::cosine: each.step = Step::cosine; break;
+            case TaylorOp::tangent: each.step = Step::tangent; break;
+            case TaylorOp::hyperbolic_tangent: each.step = Step::hyperbolic_tangent; break;
+            default: return false;
+        }
+    }
+    const bool sloped = each.step >= Step::function;
+    for (std::size_t l = 0; l < batch.lanes.size(); ++l) {
+        Instruction next = each;
+        next.out = static_cast<std::uint32_t>(batch.first + l);
+        next.a = by_lanes ? batch.lanes[l].a : static_cast<std::uint32_t>(a + l);
+        next.b = by_lanes ? batch.lanes[l].b : static_cast<std::uint32_t>(b + l);
+        next.a = sources[next.a];
+        next.b = sources[next.b];
+        next.factor = factors_[batch.first + l];
+        if (sloped) next.first = static_cast<std::uint32_t>(batch.slope_a + l);
+        if (each.step == Step::combination) {
+            const std::size_t terms = batch.terms.size() / batch.lanes.size();
+            next.first = static_cast<std::uint32_t>(program_terms_.size());
+            next.count = static_cast<std::uint32_t>(terms);
+            for (std::size_t i = 0; i < terms; ++i) {
+                program_terms_.push_back(batch.terms[l * terms + i]);
+                program_terms_.back().of *= stride;
+            }
+        }
+        program_.push_back(next);
+    }
+    return true;
+}
+
+int LazyTape::run_program(double t, const double* x, const TaylorCoefficients<double>& to,
+                          int order)
+{
+    start(t, x);
+    const std::size_t n = tape_.states, m = tape_.guards;
+    for (std::size_t place = 0; place < width_; ++place) columns_[place * stride] = rows_[place];
+    columns_[n * stride + 1] = 1;
+    std::copy_n(x, n, to.x);
+    for (int k = 0; k <= order; ++k) {
+        const bool is_last = k == order;
+        if (is_last && m == 0) break;
+        if (k > 0) run_row(k, is_last);
+        const auto at = static_cast<std::size_t>(k);
+        for (std::size_t i = 0; i < m; ++i) {
+            to.guards[at * m + i] = columns_[outputs_[n + i] * stride + at];
+        }
+        if (is_last) break;
+        for (std::size_t i = 0; i < n; ++i) {
+            const double next = columns_[outputs_[i] * stride + at] / (k + 1);
+            columns_[i * stride + at + 1] = next;
+            to.x[(at + 1) * n + i] = next;
+        }
+    }
+    return order;
+}
+
+[[gnu::always_inline]] inline double LazyTape::combined(const Instruction& of, int k) const noexcept
+{
+    const double* const columns = columns_.data() + k;
+    const Term* const terms = program_terms_.data() + of.first;
+    double sum = terms[0].factor * columns[terms[0].of];
+    for (std::uint32_t i = 1; i < of.count; ++i) {
+        sum += terms[i].factor * columns[terms[i].of];
+    }
+    return sum;
+}
+
+void LazyTape::run_row(int k, bool guards_alone)
+{
+    double* const columns = columns_.data();
+    for (const Instruction& of : program_) {
+        if (k > of.degree || (guards_alone && !of.for_guards)) continue;  // zeros
+        const double* const a = columns + of.a * stride;
+        const double* const b = columns + of.b * stride;
+        double* const out = columns + of.out * stride;
+        const int upto_a = std::min(of.degree_a, k), upto_b = std::min(of.degree_b, k);
+        const auto integral = [&] {
+            return convolved(columns + of.first * stride, b, k, 1, upto_a) / k;
+        };
+        switch (of.step) {
+            case Step::sum: out[k] = a[k] + b[k]; break;
+            case Step::difference: out[k] = a[k] - b[k]; break;
+            case Step::negative: out[k] = -a[k]; break;
+            case Step::copy: out[k] = a[k]; break;
+            case Step::times: out[k] = of.factor * a[k]; break;
+            case Step::combination: out[k] = combined(of, k); break;
+            case Step::slope: out[k] = k * a[k]; break;
+            case Step::product:
+                out[k] = convolved(a, b, k, std::max(0, k - of.degree_b), upto_a);
+                break;
+            case Step::square: out[k] = squared(a, k, std::max(0, k - of.degree_a)); break;
+            case Step::quotient:
+                out[k] = (a[k] - convolved(b, out, k, 1, upto_b)) * inverses_[of.out];
+                break;
+            case Step::constant_over:
+                out[k] = convolved(a, out, k, 1, upto_a) * inverses_[of.out];
+                break;
+            case Step::square_root: out[k] = (a[k] - squared(out, k, 1)) * inverses_[of.out]; break;
+            case Step::function: out[k] = integral(); break;
+            case Step::cosine: out[k] = -integral(); break;
+            case Step::tangent: out[k] = a[k] + integral(); break;
+            case Step::hyperbolic_tangent: out[k] = a[k] - integral(); break;
+        }
+    }
+}
+
+}  // namespace ricochet::detail
