@@ -61,7 +61,8 @@ std::optional<Runner::Strike> Runner::strike_on_wall(const Body& body, const Vec
     const double approach = -dot(arrives, wall.normal);
     const double restitution = world_.restitution(body.material, wall.material);
     Strike strike{.arrives = arrives, .leaves = {}, .impulse = {}};
-    const double size = (1 + restitution) * approach * (1 / body.inverse_mass);
+    const double whole = (1 + restitution) * approach * (1 / body.inverse_mass);
+    const double size = whole - whole * excess_of_square(wall.normal);
     strike.impulse = size * wall.normal;
     strike.leaves = arrives + body.inverse_mass * strike.impulse;
     const double least = std::max(resolution(t) * norm(world_.gravity), noise(strike.leaves, {}));

@@ -128,6 +128,9 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
         contact.normal = normal;
         contact.at = p - body.radius * normal;
+        if (world_.faces[f].kind == Face::Kind::vertex && body.radius > 0) {
+            contact.blur = World::rounding(p, body.radius) / body.radius;
+        }
         contact.restitution = world_.restitution(body.material, world_.faces[f].material);
         contact.friction = world_.friction(body.material, world_.faces[f].material);
         cluster_.contacts.push_back(contact);
@@ -237,6 +240,7 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     contact.slot_b = slot_of(j);
     contact.normal = normal;
     contact.at = 0.5 * (pa + pb);
+    contact.blur = (World::rounding(pa, reach) + World::rounding(pb, reach)) / reach;
     contact.restitution = world_.restitution(a.material, b.material);
     contact.friction = world_.friction(a.material, b.material);
     cluster_.contacts.push_back(contact);
