@@ -219,9 +219,10 @@ Groups groups_of(const World& world)
     if (world.bodies.empty()) return groups;
     groups.order_.resize(world.bodies.size());
     std::iota(groups.order_.begin(), groups.order_.end(), 0U);
-    if (world.faces.size() > world.wall_count || !world.scene.systems().empty()) {
-        // Terrain lies in the cells of a group, and moving surfaces and systems may drive bodies
-        // anywhere: all bodies are one group.
+    const bool terrain = world.faces.size() > world.wall_count;
+    if (terrain || !world.scene.systems().empty() || world.options.observe) {
+        // Terrain lies in the squares of a group, and moving surfaces and systems may drive bodies
+        // anywhere: all bodies are one group. An observer sees the events of all in their order.
         groups.ends_ = {world.bodies.size()};
         return groups;
     }

@@ -358,6 +358,14 @@ void Impacts::emit(const Cluster& cluster, double t, std::vector<SceneEvent>* ev
             impulse = impulse + contact.tangential * turned(contact.normal);
         }
         SceneEvent event{.t = t, .body = contact.a, .impulse = impulse};
+        event.at = contact.at;
+        event.normal = contact.normal;
+        if (!contact.surface) {
+            // From the middle between the centres to where the edges meet.
+            const double beside =
+                0.5 * (world_.bodies[contact.b].radius - world_.bodies[contact.a].radius);
+            event.at = event.at + beside * event.normal;
+        }
         event.before[0] = before_wave_[contact.slot_a];
         event.after[0] = cluster.after[contact.slot_a];
         if (contact.surface) {
@@ -372,6 +380,7 @@ void Impacts::emit(const Cluster& cluster, double t, std::vector<SceneEvent>* ev
                 std::swap(event.before[0], event.before[1]);
                 std::swap(event.after[0], event.after[1]);
                 event.impulse = -1.0 * event.impulse;
+                event.normal = -1.0 * event.normal;
             }
         }
         events->push_back(event);

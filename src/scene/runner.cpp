@@ -49,6 +49,7 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
     next_sample_ = 0;
     result_ = {};
     result_.events = std::move(events);
+    shown_ = result_.events.size();
 }
 
 void Runner::place_all()
@@ -66,6 +67,7 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
 {
     begin(bodies_of_group, std::move(events));
     const bool bounces = bounces_from_start();
+    show_events();
     if (bounces && flies_past_end(members_.front())) return std::move(result_);
     place_all();
     if (!bounces) settle_at_start();
@@ -102,6 +104,7 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
             happen(who);
         }
         if (world_.broken) fail_where_broken();
+        show_events();
         if (result_.event_count >= options.max_events) {
             fail(Outcome::step_limit, {},
                  fmt::format("max_events = {} events have happened", options.max_events));
@@ -111,6 +114,16 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
     const Instant end = result_.failure ? result_.failure->t : t_end_;
     sample_until(end, true, samples);
     return std::move(result_);
+}
+
+void Runner::show_new_events()
+{
+    for (; shown_ < result_.events.size(); ++shown_) {
+        world_.options.observe(result_.events[shown_]);
+    }
+    if (world_.keeps_events) return;
+    result_.events.clear();
+    shown_ = 0;
 }
 
 void Runner::fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::string message)

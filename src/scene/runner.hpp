@@ -181,6 +181,12 @@ private:
     void count_held();
     void sample_until(const Instant& t, bool inclusive, Samples& samples);
     void fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::string message);
+    /// Shows new events to the observer, if there is one.
+    void show_events()
+    {
+        if (world_.options.observe && result_.events.size() > shown_) show_new_events();
+    }
+    void show_new_events();
     [[nodiscard]] std::string called(std::uint32_t i) const
     {
         return world_.scene.name_of(BodyId{i});
@@ -221,6 +227,7 @@ private:
     std::uint32_t unmoved_ = 0;  ///< consecutive predicted impacts that moved nothing
     std::uint64_t idle_ = 0;     ///< consecutive acts at one time
     std::size_t next_sample_ = 0;
+    std::size_t shown_ = 0;  ///< of the events, to the observer
     GroupResult result_;
 };
 

@@ -80,6 +80,8 @@ void Runner::record(std::uint32_t i, const Strike& strike)
         SceneEvent event{
             .t = now_.value, .number = result_.event_count, .body = i, .impulse = strike.impulse};
         event.other = {true, world_.faces[0].surface};
+        event.normal = world_.faces[0].normal;
+        event.at = world_.position(i, now_) - world_.bodies[i].radius * event.normal;
         event.before[0] = strike.arrives;
         event.after[0] = strike.leaves;
         result_.events.push_back(event);
@@ -165,7 +167,10 @@ void Runner::bounce(std::uint32_t i)
             event.before[0] = slip * along - leaves * wall.normal;
             event.impulse = ((1 + restitution) * leaves / body.inverse_mass) * wall.normal;
             event.after[0] = slip * along + (restitution * leaves) * wall.normal;
+            event.normal = wall.normal;
+            event.at = body.p + moved * along - body.radius * wall.normal;
             result_.events.push_back(event);
+            if (result_.events.size() % 4096 == 0) show_events();
         }
         leaves *= restitution;
     }
