@@ -109,6 +109,8 @@ struct SceneStatistics {
     std::uint64_t predictions = 0;  ///< searches for a first contact, of pairs and surfaces
     std::uint64_t stale = 0;        ///< predicted impacts that did not happen
     std::uint64_t crossings = 0;    ///< from cell to cell
+    std::uint64_t layings = 0;      ///< times that cells were laid again, as they had become too
+                                    ///< large or too small for a group
     std::uint64_t steps = 0;        ///< steps of islands with springs or drag
     std::uint64_t rejected = 0;
     std::uint64_t flow_calls = 0;
