@@ -36,7 +36,7 @@ struct EnsembleRow {
 /// ensemble have different seeds.
 [[nodiscard]] std::uint64_t row_seed(std::uint64_t seed, std::size_t index) noexcept;
 
-/// Number of rows that one thread runs in sequence before it takes the next chunk.
+/// Rows of a chunk, after which progress is reported. Threads take no more than these together.
 inline constexpr std::size_t ensemble_chunk = 64;
 
 /// Progress of an ensemble, after a chunk of rows.

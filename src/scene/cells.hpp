@@ -1,5 +1,6 @@
 // A grid of cells over the whole plane, folded onto a torus: a body far away may share its bucket
-// with one that is near, which costs a test but changes no result.
+// with one that is near, which costs a test but changes no result. Points have lists of their own,
+// since they do not meet each other.
 #pragma once
 
 #include <algorithm>
@@ -16,8 +17,9 @@ class Cells {
 public:
     Cells() = default;
 
-    /// Makes empty cells with this side. The numbers of buckets are powers of two.
-    void size(double side, std::uint32_t buckets_x, std::uint32_t buckets_y)
+    /// Makes empty cells with this side. The numbers of buckets are powers of two. `points`:
+    /// whether there are any.
+    void size(double side, std::uint32_t buckets_x, std::uint32_t buckets_y, bool points)
     {
         side_ = side;
         inverse_ = 1 / side;
@@ -25,8 +27,7 @@ public:
         mask_y_ = buckets_y - 1;
         width_ = buckets_x;
         heads_.assign(static_cast<std::size_t>(buckets_x) * buckets_y, none);
-        fixed_.clear();
-        any_fixed_ = false;
+        point_heads_.assign(points ? heads_.size() : 0, none);
     }
 
     struct Cell {
@@ -51,17 +52,19 @@ public:
         Body& body = bodies[i];
         body.bucket = bucket;
         body.previous = none;
-        body.next = heads_[bucket];
+        std::uint32_t& head = heads_of(body)[bucket];
+        body.next = head;
         if (body.next != none) bodies[body.next].previous = i;
-        heads_[bucket] = i;
+        head = i;
     }
     void remove(std::vector<Body>& bodies, std::uint32_t i)
     {
         Body& body = bodies[i];
-        (body.previous == none ? heads_[body.bucket] : bodies[body.previous].next) = body.next;
+        std::uint32_t& link =
+            body.previous == none ? heads_of(body)[body.bucket] : bodies[body.previous].next;
+        link = body.next;
         if (body.next != none) bodies[body.next].previous = body.previous;
     }
-    [[nodiscard]] std::uint32_t head(std::uint32_t bucket) const noexcept { return heads_[bucket]; }
     [[nodiscard]] std::size_t buckets() const noexcept { return heads_.size(); }
 
     /// Visits the cell and its neighbours.
@@ -79,14 +82,39 @@ public:
     }
     /// Visits the bodies in the cell and its neighbours: the first of each, then the second of
     /// each, and so on. The ends of short lists are branches that cannot be predicted, and this
-    /// order has the fewest.
+    /// order has the fewest. `points`: whether points are visited, too.
     template <class Visit>
-    void each_around(const Cell& cell, const std::vector<Body>& bodies, const Visit& visit) const
+    void each_around(const Cell& cell, const std::vector<Body>& bodies, bool points,
+                     const Visit& visit) const
+    {
+        each_of(heads_, cell, bodies, visit);
+        if (points && !point_heads_.empty()) each_of(point_heads_, cell, bodies, visit);
+    }
+    /// Visits the bodies in a bucket.
+    template <class Visit>
+    void each_in(std::uint32_t bucket, const std::vector<Body>& bodies, bool points,
+                 const Visit& visit) const
+    {
+        for (std::uint32_t j = heads_[bucket]; j != none; j = bodies[j].next) visit(j);
+        if (!points || point_heads_.empty()) return;
+        for (std::uint32_t j = point_heads_[bucket]; j != none; j = bodies[j].next) visit(j);
+    }
+
+private:
+    using Heads = std::vector<std::uint32_t>;  ///< the first body of each bucket
+
+    [[nodiscard]] Heads& heads_of(const Body& body) noexcept
+    {
+        return body.radius == 0 ? point_heads_ : heads_;
+    }
+    template <class Visit>
+    void each_of(const Heads& heads, const Cell& cell, const std::vector<Body>& bodies,
+                 const Visit& visit) const
     {
         std::array<std::uint32_t, 9> layer;
         std::size_t count = 0;
         around(cell, [&](std::uint32_t bucket) {
-            layer[count] = heads_[bucket];
+            layer[count] = heads[bucket];
             count += layer[count] != none ? 1 : 0;
         });
         while (count > 0) {
@@ -100,34 +128,10 @@ public:
             count = deeper;
         }
     }
-    /// Visits the bodies in a bucket.
-    template <class Visit>
-    void each_in(std::uint32_t bucket, const std::vector<Body>& bodies, const Visit& visit) const
-    {
-        for (std::uint32_t j = heads_[bucket]; j != none; j = bodies[j].next) visit(j);
-    }
-
-    /// Adds a face that reaches into a bucket; without any, `any_faces()` is false.
-    void add_face(std::uint32_t bucket, std::uint32_t face)
-    {
-        if (fixed_.empty()) fixed_.resize(heads_.size());
-        auto& list = fixed_[bucket];
-        if (std::ranges::find(list, face) == list.end()) list.push_back(face);
-        any_fixed_ = true;
-    }
-    [[nodiscard]] const std::vector<std::uint32_t>& faces(std::uint32_t bucket) const noexcept
-    {
-        return fixed_[bucket];
-    }
-    [[nodiscard]] bool any_faces() const noexcept { return any_fixed_; }
-
-private:
     double side_ = 1;
     double inverse_ = 1;
     std::uint32_t mask_x_ = 0, mask_y_ = 0, width_ = 1;
-    std::vector<std::uint32_t> heads_;
-    std::vector<std::vector<std::uint32_t>> fixed_;
-    bool any_fixed_ = false;
+    Heads heads_, point_heads_;
 };
 
 }  // namespace ricochet::detail

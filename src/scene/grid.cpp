@@ -11,11 +11,13 @@ namespace ricochet::detail {
 
 namespace {
 
-/// Up to this number of bodies there are no cells: testing all pairs costs less than the crossings
-/// from cell to cell.
-constexpr double few_bodies = 16;
-constexpr std::size_t few_faces = 64;
 constexpr double boundless = 0x1p200;
+
+/// Bodies whose density around them is measured. The box is even enough if a square that would hold
+/// `in_a_square` others at its density holds between half and twice as many; by chance fewer bodies
+/// than these differ by more.
+constexpr double most_uncounted = 64;
+constexpr double in_a_square = 6;
 
 /// [cells] A ring is laid again when its body has moved this far along an axis. A big body of
 /// radius R is struck 2 R n v times a second by bodies of density n and speed v, and each time
@@ -30,77 +32,69 @@ constexpr double play = 0.35;
 constexpr double visiting = 0.2;
 constexpr double laying = 1;
 
-Box box_of(const World& world, std::span<const std::uint32_t> members)
-{
-    Vector2 low{never, never};
-    Vector2 high{-never, -never};
-    Box box{.count = static_cast<double>(members.size())};
-    for (const std::uint32_t i : members) {
-        const Body& body = world.bodies[i];
-        for (std::size_t c = 0; c < 2; ++c) {
-            low[c] = std::min(low[c], body.p[c]);
-            high[c] = std::max(high[c], body.p[c]);
-        }
-        box.largest = std::max(box.largest, body.radius);
-    }
-    box.extent = high - low + Vector2{2 * box.largest, 2 * box.largest};
-    return box;
-}
-
-[[nodiscard]] std::uint32_t buckets(double cells, double count)
-{
-    return std::bit_ceil(
-        static_cast<std::uint32_t>(std::clamp(cells, 4.0, 4 * std::sqrt(count) + 1e3)));
-}
-
 [[nodiscard]] std::uint32_t power_above(double count)
 {
     return std::bit_ceil(static_cast<std::uint32_t>(std::ceil(count)));
 }
 
-/// The least and the greatest height of the line from a to b between `left` and `right`.
-std::pair<double, double> heights(const Vector2& a, const Vector2& b, double left, double right)
+/// Numbers of buckets along x and y: one for each cell of the box, but no more than there would be
+/// for bodies that are evenly spread.
+std::array<std::uint32_t, 2> buckets(const Vector2& extent, double side, double count,
+                                     std::uint32_t least)
 {
-    if (a[0] == b[0]) return std::minmax({a[1], b[1]});
-    const auto height = [&](double x) {
-        return a[1] + std::clamp((x - a[0]) / (b[0] - a[0]), 0.0, 1.0) * (b[1] - a[1]);
-    };
-    return std::minmax({height(left), height(right)});
+    std::array<std::uint32_t, 2> number{};
+    for (std::size_t c = 0; c < 2; ++c) {
+        const double cells = std::clamp(extent[c] / side, 4.0, 0x1p24);
+        number[c] = std::max(std::bit_ceil(static_cast<std::uint32_t>(cells)), least);
+    }
+    const double most = 16 * count + 64;
+    for (;;) {
+        auto& longer = number[number[0] < number[1] ? 1 : 0];
+        const double all = static_cast<double>(number[0]) * static_cast<double>(number[1]);
+        if (all <= most || longer <= std::max(least, 4U)) return number;
+        longer /= 2;
+    }
 }
 
-/// A face lies in every bucket from which a body can touch it. One that is as long as very many
-/// cells, or as far away, lies in all buckets.
-void place_faces(const World& world, double reach, Cells& cells)
+/// The mean number of other bodies in the square of a body, in a lattice of squares with this side.
+double mean_others(std::span<const Vector2> places, double side, std::vector<std::uint32_t>& counts)
 {
-    constexpr double most = 1 << 20;               // cells along a face
-    constexpr double far = std::int64_t{1} << 52;  // whose number is still a whole one
-    const double side = cells.side();
-    const double radius = reach + 0.7072 * side;
-    const auto row_of = [&](double y) { return cells.cell_of({0, y}).y; };
-    for (std::uint32_t f = world.wall_count; f < world.fixed_count; ++f) {
-        const Face& face = world.faces[f];
-        const Vector2 end = face.at - face.length * turned(face.normal);
-        const auto [left, right] = std::minmax({face.at[0], end[0]});
-        const auto [low, high] = std::minmax({face.at[1], end[1]});
-        const double farthest = std::max({-left, right, -low, high});
-        if (!(right - left + high - low < most * side && farthest + reach < far * side)) {
-            for (std::uint32_t b = 0; b < cells.buckets(); ++b) cells.add_face(b, f);
-            continue;
-        }
-        const auto from = cells.cell_of({left - reach, low - reach});
-        const auto to = cells.cell_of({right + reach, high + reach});
-        for (std::int64_t x = from.x; x <= to.x; ++x) {
-            const double across = (static_cast<double>(x) + 0.5) * side;
-            const auto [lowest, highest] = heights(face.at, end, across - radius, across + radius);
-            const std::int64_t first = std::max(from.y, row_of(lowest - radius) - 1);
-            const std::int64_t last = std::min(to.y, row_of(highest + radius) + 1);
-            for (std::int64_t y = first; y <= last; ++y) {
-                const Vector2 middle{across, (static_cast<double>(y) + 0.5) * side};
-                const double apart = norm(middle - nearest_on(face.at, end, middle));
-                if (apart <= radius) cells.add_face(cells.bucket_of(x, y), f);
-            }
-        }
+    const auto bits = static_cast<unsigned>(std::bit_width(8 * places.size()));
+    counts.assign(std::size_t{1} << bits, 0);
+    const auto square_of = [&](const Vector2& p) {
+        const auto number = [&](std::size_t c) {
+            const double squares = std::floor((p[c] - places[0][c]) / side);
+            return static_cast<std::uint64_t>(static_cast<std::int64_t>(squares));
+        };
+        const std::uint64_t x = number(0);
+        const std::uint64_t y = number(1);
+        const std::uint64_t mixed = (x * 0x9e3779b97f4a7c15U + y) * 0xbf58476d1ce4e5b9U;
+        return static_cast<std::size_t>(mixed >> (64 - bits));
+    };
+    for (const Vector2& p : places) ++counts[square_of(p)];
+    double sum = 0;
+    for (const std::uint32_t count : counts) sum += static_cast<double>(count) * (count - 1.0);
+    return sum / static_cast<double>(places.size());
+}
+
+/// [m^2] Area that the bodies would take if they were everywhere as dense as a body finds it around
+/// itself: much less than that of their box where most of it is empty, and more where they are on a
+/// line.
+double area_by_density(std::span<const Vector2> places, double area)
+{
+    const auto count = static_cast<double>(places.size());
+    std::vector<std::uint32_t> counts;
+    double side = std::sqrt((in_a_square + 0.5) * area / count);
+    const double least = 1e-12 * side;
+    for (int round = 0; round < 40 && side > least; ++round) {
+        const double others = mean_others(places, side, counts);
+        const bool even = others >= in_a_square / 2 && others <= 2 * in_a_square;
+        if (even && round == 0) return area;
+        const bool found = others >= in_a_square / 1.5 && others <= 1.5 * in_a_square;
+        if (found) return count * side * side / (others + 0.5);
+        side *= std::sqrt((in_a_square + 0.5) / (others + 0.5));
     }
+    return std::clamp(count * side * side / in_a_square, 1e-12 * area, area);
 }
 
 /// Bodies by size, the largest first, in classes of half an octave.
@@ -126,7 +120,7 @@ double work(const SizeClasses& classes, std::size_t big, const Box& box, double 
     }
     if (small.count == 0) return never;
     constexpr double pi = 3.141592653589793;
-    const double area = box.extent[0] * box.extent[1];
+    const double area = box.area;
     const double room = std::max(area - pi * large.squares, 0.1 * area);
     const double mean = (small.radii + large.radii) / box.count;
     const double density = small.count / room;
@@ -149,14 +143,43 @@ double work(const SizeClasses& classes, std::size_t big, const Box& box, double 
     return of_small + of_rings + (large.radii + large.count * (mean + laid)) * others;
 }
 
+/// Bodies of ordinary size of which some are points.
+struct Mixture {
+    double discs = 0, points = 0;
+    double radius = 0;  ///< [m] mean of the discs
+};
+
+/// [m] Side of cells where points, which are tested against discs alone, are among discs: the sum
+/// of crossings and tests is least. Between the sides for all bodies and for the discs alone.
+double side_of_mixture(double area, const Mixture& of, double from, double to)
+{
+    const double density = (of.discs + of.points) / area;
+    const double of_discs = of.discs / area;
+    const double wide = 1 / std::sqrt(area);
+    // Impacts of discs and of points while all move by one metre; with walls, one in each width.
+    const double struck = of.discs * (2 * of.radius * (density + of_discs) + wide);
+    const double strike = of.points * (2 * of.radius * of_discs + wide);
+    const auto cost = [&](double side) {
+        const double crossings = 4 / (3.141592653589793 * side);
+        const double ahead = 3 * side * side;
+        return crossings * ((of.discs + of.points) * crossing_cost +
+                            ahead * (of.discs * density + of.points * of_discs)) +
+               3 * ahead * (struck * density + strike * of_discs);
+    };
+    double best = from;
+    for (double side = from; side < to; side *= 1.25) {
+        if (cost(side) < cost(best)) best = side;
+    }
+    return best;
+}
+
 }  // namespace
 
 double largest_ordinary(const World& world, std::span<const std::uint32_t> members, const Box& box,
                         double slack)
 {
-    if (box.count <= few_bodies) return box.largest;
-    const double area = box.extent[0] * box.extent[1];
-    if (2 * box.largest * slack <= side_of(area, box.count, 0, slack)) return box.largest;
+    if (box.count <= static_cast<double>(few_bodies)) return box.largest;
+    if (2 * box.largest * slack <= side_of(box.area, box.count, 0, slack)) return box.largest;
     SizeClasses classes;
     for (const std::uint32_t i : members) {
         const double r = world.bodies[i].radius;
@@ -181,15 +204,38 @@ double largest_ordinary(const World& world, std::span<const std::uint32_t> membe
     return ordinary;
 }
 
-void Grid::size(World& world, std::span<const std::uint32_t> members, bool steps)
+Box box_of(const World& world, std::span<const std::uint32_t> members,
+           std::span<const Vector2> places)
 {
-    const Box box = box_of(world, members);
+    Vector2 low{never, never};
+    Vector2 high{-never, -never};
+    Box box{.count = static_cast<double>(members.size())};
+    for (std::size_t k = 0; k < members.size(); ++k) {
+        for (std::size_t c = 0; c < 2; ++c) {
+            low[c] = std::min(low[c], places[k][c]);
+            high[c] = std::max(high[c], places[k][c]);
+        }
+        box.largest = std::max(box.largest, world.bodies[members[k]].radius);
+    }
+    box.extent = high - low + Vector2{2 * box.largest, 2 * box.largest};
+    const double area = box.extent[0] * box.extent[1];
+    const bool counted = box.count >= most_uncounted && std::isfinite(area);
+    box.area = counted ? area_by_density(places, area) : area;
+    box.uneven = box.area != area;
+    return box;
+}
+
+void Grid::size(World& world, std::span<const std::uint32_t> members,
+                std::span<const Vector2> places, bool steps)
+{
+    const Box box = box_of(world, members, places);
     // Steps are tested only now and then, and may lie a tenth outside their cell.
     const double slack = steps ? 1.3 : 1.0001;
     const double wanted = world.tuning.big_above;
     const double ordinary =
         std::isnan(wanted) ? largest_ordinary(world, members, box, slack) : wanted;
     Box small{.extent = box.extent};
+    Mixture mixture;
     double taken = 0;
     for (const std::uint32_t i : members) {
         Body& body = world.bodies[i];
@@ -199,24 +245,44 @@ void Grid::size(World& world, std::span<const std::uint32_t> members, bool steps
         } else {
             small.largest = std::max(small.largest, body.radius);
             small.count += 1;
+            mixture.radius += body.radius;
+            (body.radius > 0 ? mixture.discs : mixture.points) += 1;
         }
     }
-    const double area = box.extent[0] * box.extent[1];
-    const double room = std::max(area - taken, 0.1 * area);
+    const double room = box.uneven ? box.area : std::max(box.area - taken, 0.1 * box.area);
     double side = side_of(room, std::max(small.count, 1.0), small.largest, slack);
     if (!(side > 0)) side = std::max({box.extent[0], box.extent[1], 1.0});
+    if (mixture.points > 0 && mixture.discs > 0) {
+        mixture.radius /= mixture.discs;
+        side = side_of_mixture(room, mixture, side,
+                               side_of(room, mixture.discs, small.largest, slack));
+    }
     const bool some_big = small.count < box.count;
-    const bool few = world.fixed_count - world.wall_count <= few_faces;
-    if (box.count <= few_bodies && few && !some_big) side = boundless;
-    cells_.size(side, 4, 4);
+    if (box.count <= static_cast<double>(few_bodies) && !some_big) side = boundless;
+    const double forced = world.tuning.cell_side;
+    if (!std::isnan(forced)) side = std::max(2 * small.largest * slack, forced);
+    const bool points = mixture.points > 0;
+    cells_.size(side, 4, 4, points);
     rings_.size(cells_, small.largest, play * side, steps ? 0.1 * side : 0);
     const std::uint32_t least = some_big ? power_above(rings_.across(cells_, box.largest)) : 4;
-    cells_.size(side, std::max(buckets(box.extent[0] / side, box.count), least),
-                std::max(buckets(box.extent[1] / side, box.count), least));
-    const double reach = 1.001 * small.largest + 0.15 * side;
-    place_faces(world, reach, cells_);
-    find_cells_away(world, reach);
+    const auto [columns, rows] = buckets(box.extent, side, box.count, least);
+    cells_.size(side, columns, rows, points);
+    find_cells_away(world, 1.001 * small.largest + 0.15 * side);
     if (some_big) size_big(world, members, box);
+}
+
+void Grid::lay_terrain(const World& world, std::span<const std::uint32_t> members)
+{
+    double ordinary = 0;
+    double big = 0;
+    for (const std::uint32_t i : members) {
+        const Body& body = world.bodies[i];
+        double& largest = body.big ? big : ordinary;
+        largest = std::max(largest, body.radius);
+    }
+    terrain_.lay(world, ordinary);
+    terrain_of_big_ = {};
+    if (big > 0) terrain_of_big_.lay(world, big);
 }
 
 void Grid::find_cells_away(const World& world, double reach)
@@ -253,13 +319,11 @@ void Grid::size_big(const World& world, std::span<const std::uint32_t> members, 
         ring_of_[i] = rings_.add(world.bodies[i].radius);
         count += 1;
     }
-    const bool few = world.fixed_count - world.wall_count <= few_faces;
     const double reach = 1.001 * box.largest + 0.5 * cells_.side();
-    double side = std::max(2 * reach, 0.65 * std::sqrt(box.extent[0] * box.extent[1] / count));
-    if (count <= few_bodies && few) side = boundless;
-    big_cells_.size(side, buckets(box.extent[0] / side, count),
-                    buckets(box.extent[1] / side, count));
-    place_faces(world, reach, big_cells_);
+    double side = std::max(2 * reach, 0.65 * std::sqrt(box.area / count));
+    if (count <= static_cast<double>(few_bodies)) side = boundless;
+    const auto [columns, rows] = buckets(box.extent, side, count, 4);
+    big_cells_.size(side, columns, rows, false);
 }
 
 Cells::Cell Grid::insert(std::vector<Body>& bodies, std::uint32_t i, const Vector2& p)

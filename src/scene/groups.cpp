@@ -142,8 +142,9 @@ void by_energy(const World& world, std::span<const std::uint32_t> group, std::ve
 /// Joins all boxes that overlap along one axis; true if the set was divided.
 class Divider {
 public:
-    Divider(const std::vector<Reach>& reaches, std::vector<std::uint32_t>& order)
-        : reaches_(reaches), order_(order)
+    Divider(const World& world, const std::vector<Reach>& reaches,
+            std::vector<std::uint32_t>& order)
+        : world_(world), reaches_(reaches), order_(order)
     {
         reserve_large(ends, order.size());
     }
@@ -181,9 +182,20 @@ private:
         const auto first = order_.begin() + static_cast<std::ptrdiff_t>(begin);
         const auto last = order_.begin() + static_cast<std::ptrdiff_t>(end);
         std::sort(first, last);
+        // Points do not meet each other.
+        if (end - begin > 1 && std::all_of(first, last, [&](auto i) { return is_free_point(i); })) {
+            for (std::size_t k = begin + 1; k < end; ++k) ends.push_back(k);
+        }
         ends.push_back(end);
     }
+    [[nodiscard]] bool is_free_point(std::uint32_t i) const
+    {
+        const Body& body = world_.bodies[i];
+        const bool tied = body.island != none && world_.islands->members(body.island).size() > 1;
+        return body.radius == 0 && !tied;
+    }
 
+    const World& world_;
     const std::vector<Reach>& reaches_;
     std::vector<std::uint32_t>& order_;
 };
@@ -219,15 +231,16 @@ Groups groups_of(const World& world)
     if (world.bodies.empty()) return groups;
     groups.order_.resize(world.bodies.size());
     std::iota(groups.order_.begin(), groups.order_.end(), 0U);
-    if (world.faces.size() > world.wall_count || !world.scene.systems().empty()) {
-        // Terrain lies in the cells of a group, and moving surfaces and systems may drive bodies
-        // anywhere: all bodies are one group.
+    const bool terrain = world.faces.size() > world.wall_count;
+    if (terrain || !world.scene.systems().empty() || world.options.observe) {
+        // Terrain lies in the squares of a group, and moving surfaces and systems may drive bodies
+        // anywhere: all bodies are one group. An observer sees the events of all in their order.
         groups.ends_ = {world.bodies.size()};
         return groups;
     }
     std::vector<Reach> boxes = reaches(world);
     for (;;) {
-        Divider divider(boxes, groups.order_);
+        Divider divider(world, boxes, groups.order_);
         divider.divide(0, groups.order_.size(), 0, false);
         const bool all_apart = divider.ends.size() == groups.order_.size();
         const bool as_before = divider.ends.size() == groups.size();

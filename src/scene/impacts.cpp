@@ -45,6 +45,14 @@ double Impacts::noise(const Cluster& cluster, const Contact& contact) const
     return 8 * epsilon * (norm(cluster.after[contact.slot_a]) + other);
 }
 
+/// [m/s] Change of the velocity at a contact that is rounding of what the fastest body of a cluster
+/// has handed on, since normals are a rounding off their directions. It acts, and is no impact.
+double Impacts::unrecorded(const Cluster& cluster, const Contact& contact)
+{
+    if (cluster.contacts.size() == 1) return 0;
+    return (8 * epsilon + contact.blur) * cluster.fastest;
+}
+
 void Impacts::push(Cluster& cluster, const Contact& contact, const Vector2& impulse) const
 {
     if (!cluster.couplings.empty()) return push_coupled(cluster, contact, impulse);
@@ -97,11 +105,14 @@ void Impacts::set_masses(Cluster& cluster) const
     }
 }
 
-/// Resolves one contact alone, in closed form.
+/// Resolves one contact alone, in closed form. The normal has the length 1 up to rounding, always
+/// on the same side for the same normal: uncorrected, an elastic impact would change the energy by
+/// |n|^2 - 1 of the work, and many of them would make it drift.
 void Impacts::strike(Cluster& cluster, Contact& contact) const
 {
     const double u = approach(cluster, contact);
-    contact.impulse = (1 + contact.restitution) * u * contact.mass;
+    const double size = (1 + contact.restitution) * u * contact.mass;
+    contact.impulse = size - size * excess_of_square(contact.normal);
     contact.tangential = 0;
     if (contact.friction > 0) {
         const Vector2 tangent = turned(contact.normal);
@@ -320,7 +331,8 @@ bool Impacts::wave(Cluster& cluster)
     for (std::uint32_t k = 0; k < cluster.contacts.size(); ++k) {
         const Contact& contact = cluster.contacts[k];
         const double u = approach(cluster, contact);
-        const bool fast = u >= fastest * (1 - tie) && u > noise(cluster, contact);
+        const double rounding = noise(cluster, contact);
+        const bool fast = u >= fastest * (1 - tie - contact.blur) && u > rounding;
         if (together || fast) struck_.push_back(k);
     }
     ++world_.statistics.waves;
@@ -338,7 +350,7 @@ void Impacts::emit(const Cluster& cluster, double t, std::vector<SceneEvent>* ev
 {
     for (const std::uint32_t k : struck_) {
         const Contact& contact = cluster.contacts[k];
-        if (contact.impulse == 0) continue;
+        if (contact.impulse <= unrecorded(cluster, contact) * contact.mass) continue;
         ++world_.statistics.impacts;
         if (!events) continue;
         Vector2 impulse = contact.impulse * contact.normal;
@@ -346,6 +358,14 @@ void Impacts::emit(const Cluster& cluster, double t, std::vector<SceneEvent>* ev
             impulse = impulse + contact.tangential * turned(contact.normal);
         }
         SceneEvent event{.t = t, .body = contact.a, .impulse = impulse};
+        event.at = contact.at;
+        event.normal = contact.normal;
+        if (!contact.surface) {
+            // From the middle between the centres to where the edges meet.
+            const double beside =
+                0.5 * (world_.bodies[contact.b].radius - world_.bodies[contact.a].radius);
+            event.at = event.at + beside * event.normal;
+        }
         event.before[0] = before_wave_[contact.slot_a];
         event.after[0] = cluster.after[contact.slot_a];
         if (contact.surface) {
@@ -360,6 +380,7 @@ void Impacts::emit(const Cluster& cluster, double t, std::vector<SceneEvent>* ev
                 std::swap(event.before[0], event.before[1]);
                 std::swap(event.after[0], event.after[1]);
                 event.impulse = -1.0 * event.impulse;
+                event.normal = -1.0 * event.normal;
             }
         }
         events->push_back(event);
@@ -379,6 +400,8 @@ bool Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneE
     if (!cluster.couplings.empty()) set_masses(cluster);
     const std::size_t each = cluster.lasting ? lasting_patience : patience;
     const std::size_t most = each * cluster.contacts.size();
+    cluster.fastest = 0;
+    for (const Vector2& v : cluster.before) cluster.fastest = std::max(cluster.fastest, norm(v));
     for (std::size_t waves = 0; !spend; ++waves) {
         if (waves == most) spend = true;
         if (!wave(cluster)) return false;

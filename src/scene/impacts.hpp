@@ -15,7 +15,8 @@ struct Contact {
     bool surface = false;
     std::uint32_t slot_a = 0, slot_b = 0;  ///< in the cluster
     Vector2 normal{};
-    Vector2 at{};  ///< place by which contacts are ordered, independent of the labels
+    Vector2 at{};     ///< place by which contacts are ordered, independent of the labels
+    double blur = 0;  ///< [rad] rounding of the normal
     double restitution = 1;
     double friction = 0;
     double impulse = 0;  ///< of the current solve, normal and tangential
@@ -55,6 +56,7 @@ struct Cluster {
     std::vector<std::vector<Side>> sides;  ///< of bodies that are points
     std::vector<Coupling> couplings;       ///< where there are systems
     std::vector<Vector2> impulses;         ///< the same, on each body
+    double fastest = 0;                    ///< [m/s] the largest speed before
     bool lasting = false;                  ///< whether one of the bodies is in lasting contact
 
     void clear()
@@ -83,6 +85,7 @@ public:
 private:
     [[nodiscard]] double approach(const Cluster& cluster, const Contact& contact) const;
     [[nodiscard]] double noise(const Cluster& cluster, const Contact& contact) const;
+    [[nodiscard]] static double unrecorded(const Cluster& cluster, const Contact& contact);
     void push(Cluster& cluster, const Contact& contact, const Vector2& impulse) const;
     void push_coupled(Cluster& cluster, const Contact& contact, const Vector2& impulse) const;
     void set_masses(Cluster& cluster) const;

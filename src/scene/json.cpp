@@ -378,7 +378,7 @@ private:
     static void run(const Part& part, SceneOptions& options)
     {
         part.only({"t_start", "t_end", "rtol", "atol", "impacts", "elastic_within", "contact_step",
-                   "sample_times", "max_events"});
+                   "sample_times", "max_events", "record_events"});
         part.number("t_start", options.t_start);
         part.number("t_end", options.t_end);
         part.number("rtol", options.rtol);
@@ -389,6 +389,11 @@ private:
             const json& most = part.at("max_events");
             if (!most.is_number_unsigned()) part.expected("a whole number", "max_events", most);
             options.max_events = most.get<std::uint64_t>();
+        }
+        if (part.has("record_events")) {
+            const json& kept = part.at("record_events");
+            if (!kept.is_boolean()) part.expected("true or false", "record_events", kept);
+            options.record_events = kept.get<bool>();
         }
         std::string law = "waves";
         part.text("impacts", law);

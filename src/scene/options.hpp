@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <limits>
 #include <stdexcept>
 
@@ -14,6 +15,11 @@ void validate(const SceneOptions& options);
 struct SceneTuning {
     /// Bodies of a larger radius [m] are in the second grid.
     double big_above = std::numeric_limits<double>::quiet_NaN();
+    /// [m] Side of the cells, unless bodies of ordinary size need larger ones.
+    double cell_side = std::numeric_limits<double>::quiet_NaN();
+    /// The grid is laid again after this number of acts (events, crossings), whatever they cost;
+    /// 0: where it saves time.
+    std::uint64_t lay_after = 0;
     /// The calendar of a group of at least this many bodies is a ring of lists. In a gas of discs
     /// that cover 0.3 of the area a ring takes 3 % more time at 100 bodies and the same at 300; it
     /// takes 5 % less at 1000 and 3000, 14 % less at 10 000 and 2 % less at 100 000.

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "scene/moving.hpp"
 
@@ -14,6 +15,12 @@ namespace {
 
 /// Consecutive acts at one time, and 64 per body: by trial, far more than any collapse takes.
 constexpr std::uint64_t most_idle = 100'000;
+
+/// The grid is laid again where tests and crossings an event have grown by this factor, looked at
+/// after this number of acts a body, and at least so many: it costs as much as an event of each.
+constexpr double grown = 1.5;
+constexpr std::uint64_t acts_each = 4;
+constexpr std::uint64_t least_acts = 2048;
 
 }  // namespace
 
@@ -47,18 +54,108 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
     unmoved_ = 0;
     idle_ = 0;
     next_sample_ = 0;
+    work_ = {};
     result_ = {};
     result_.events = std::move(events);
+    shown_ = result_.events.size();
 }
 
 void Runner::place_all()
 {
-    celled_ = members_.size() > 1 || world_.fixed_count > world_.wall_count;
-    if (!celled_) return;
-    grid_.size(world_, members_, !islands_.empty());
+    const bool disc =
+        std::ranges::any_of(members_, [&](std::uint32_t i) { return world_.bodies[i].radius > 0; });
+    celled_ = members_.size() > 1 && disc;
+    on_terrain_ = world_.fixed_count > world_.wall_count;
+    places_.clear();
+    for (const std::uint32_t i : members_) places_.push_back(world_.bodies[i].p);
+    if (celled_) fill_cells();
+    if (!on_terrain_) return;
+    grid_.lay_terrain(world_, members_);
+    terrain_.begin(members_);
     for (const std::uint32_t i : members_) {
-        pending_[i].cell = grid_.insert(world_.bodies, i, world_.bodies[i].p);
+        const Body& body = world_.bodies[i];
+        terrain_[i].square = grid_.terrain(body).at(body.p);
     }
+}
+
+/// Makes cells for the bodies at `places_`.
+void Runner::fill_cells()
+{
+    grid_.size(world_, members_, places_, !islands_.empty());
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+        const std::uint32_t i = members_[k];
+        pending_[i].cell = grid_.insert(world_.bodies, i, places_[k]);
+    }
+    const SceneStatistics& s = world_.statistics;
+    const std::uint64_t forced = world_.tuning.lay_after;
+    if (work_.interval == 0) {
+        work_.interval = std::max<std::uint64_t>(acts_each * members_.size(), least_acts);
+        if (members_.size() <= few_bodies)
+            work_.interval = std::numeric_limits<std::uint64_t>::max();
+    }
+    work_ = {.tests = s.predictions,
+             .crossings = s.crossings,
+             .events = result_.event_count,
+             .left = forced > 0 ? forced : work_.interval,
+             .interval = work_.interval};
+}
+
+/// Where a body is now, as far as its cell is concerned.
+Vector2 Runner::place_now(std::uint32_t i) const
+{
+    const Body& body = world_.bodies[i];
+    const bool later = body.mapped || before(body.t, now_);
+    return later ? world_.path(i, before(now_, body.t) ? body.t : now_).c[0] : body.p;
+}
+
+/// Lays the cells for the present places. All meetings are predicted again, since cells that were
+/// neighbours are not any more; the predictions are those of before where both were made.
+void Runner::lay_cells_again()
+{
+    places_.clear();
+    for (const std::uint32_t i : members_) places_.push_back(place_now(i));
+    const std::vector<char> were_big = [&] {
+        std::vector<char> out;
+        for (const std::uint32_t i : members_) out.push_back(world_.bodies[i].big ? 1 : 0);
+        return out;
+    }();
+    fill_cells();
+    ++world_.statistics.layings;
+    bool changed = false;
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+        changed = changed || world_.bodies[members_[k]].big != (were_big[k] != 0);
+    }
+    if (changed && on_terrain_) {
+        grid_.lay_terrain(world_, members_);
+        for (std::size_t k = 0; k < members_.size(); ++k) {
+            const std::uint32_t i = members_[k];
+            terrain_[i].square = grid_.terrain(world_.bodies[i]).at(places_[k]);
+        }
+    }
+    for (const std::uint32_t i : members_) predict(i);
+}
+
+/// Lays the cells again where tests and crossings an event have grown since they were laid. Where
+/// that changes little, the next look is later.
+void Runner::watch_work()
+{
+    const SceneStatistics& s = world_.statistics;
+    if (world_.tuning.lay_after > 0) return lay_cells_again();
+    work_.left = work_.interval;
+    const auto since = [](std::uint64_t now, std::uint64_t then) {
+        return static_cast<double>(now - then);
+    };
+    const double work =
+        since(s.predictions, work_.tests) + crossing_cost * since(s.crossings, work_.crossings);
+    const double each = work / std::max(since(result_.event_count, work_.events), 1.0);
+    work_.tests = s.predictions;
+    work_.crossings = s.crossings;
+    work_.events = result_.event_count;
+    if (work_.least == 0 || each < work_.least) work_.least = each;
+    if (each <= grown * work_.least) return;
+    const double before = grid_.side();
+    lay_cells_again();
+    if (std::fabs(grid_.side() / before - 1) < 0.1) work_.interval *= 2;
 }
 
 GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
@@ -66,6 +163,7 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
 {
     begin(bodies_of_group, std::move(events));
     const bool bounces = bounces_from_start();
+    show_events();
     if (bounces && flies_past_end(members_.front())) return std::move(result_);
     place_all();
     if (!bounces) settle_at_start();
@@ -96,21 +194,35 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
         if (who >= bodies) {
             const auto groups = entry_of_group(0);
             who < groups ? step_island(who - bodies) : step_group(who - groups);
+        } else if (leaves_first(who)) {
+            leave_square(who);
         } else if (before(pending_[who].crossing, pending_[who].t)) {
             cross(who);
         } else {
             happen(who);
         }
         if (world_.broken) fail_where_broken();
+        show_events();
         if (result_.event_count >= options.max_events) {
             fail(Outcome::step_limit, {},
                  fmt::format("max_events = {} events have happened", options.max_events));
         }
         if (is_cancelled()) fail(Outcome::cancelled, {}, "the run was cancelled");
+        if (celled_ && --work_.left == 0 && !result_.failure) watch_work();
     }
     const Instant end = result_.failure ? result_.failure->t : t_end_;
     sample_until(end, true, samples);
     return std::move(result_);
+}
+
+void Runner::show_new_events()
+{
+    for (; shown_ < result_.events.size(); ++shown_) {
+        world_.options.observe(result_.events[shown_]);
+    }
+    if (world_.keeps_events) return;
+    result_.events.clear();
+    shown_ = 0;
 }
 
 void Runner::fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::string message)
@@ -252,8 +364,7 @@ void Runner::consider_body(std::uint32_t i, std::uint32_t j)
 
 void Runner::consider_faces(std::uint32_t i)
 {
-    if (!grid_.any_faces()) return;
-    for (const std::uint32_t f : grid_.faces(world_.bodies[i])) {
+    for (const std::uint32_t f : faces_of(i)) {
         if (known_to_group(i, true, f)) continue;
         consider(i, meet_face(world_, i, f), true, f);
     }
@@ -264,6 +375,7 @@ void Runner::predict(std::uint32_t i)
     Pending& pending = pending_[i];
     pending.t = pending.crossing = no_instant;
     pending.kind = Pending::Kind::nothing;
+    if (on_terrain_) terrain_[i].exit = {};
     const Body& body = world_.bodies[i];
     if (!world_.motions.empty() && !body.mapped) consider_moving(i);
     if (body.asleep) {
@@ -273,9 +385,12 @@ void Runner::predict(std::uint32_t i)
             consider_own(i);
             consider_walls(i);
         }
+        if (body.quartic) move_to_cell(i);
+        if (on_terrain_ && !body.mapped) {
+            consider_faces(i);
+            predict_leaving(i);
+        }
         if (celled_) {
-            if (body.quartic) move_to_cell(i);
-            if (!body.mapped) consider_faces(i);
             grid_.each_near(world_.bodies, i, pending.cell,
                             [&](std::uint32_t j) { consider_body(i, j); });
             predict_crossing(i);
@@ -297,103 +412,119 @@ void Runner::offer(std::uint32_t i)
 void Runner::put_in_calendar(std::uint32_t i)
 {
     const Pending& pending = pending_[i];
-    calendar_.set(i, before(pending.crossing, pending.t) ? pending.crossing : pending.t);
+    const Instant& first = before(pending.crossing, pending.t) ? pending.crossing : pending.t;
+    calendar_.set(i, leaves_first(i) ? terrain_[i].exit.t : first);
 }
 
-/// Whether the bound of its current step keeps a body in its cell and the margin around it.
-bool Runner::stays_in_cell(const Body& body, const Vector2& sweep, const Vector2& corner,
-                           double side) const
+/// Whether the bound of its current step keeps a body in a square and the margin around it.
+static bool stays_in(const Square& square, double outside, const Vector2& p, const Vector2& sweep)
 {
     for (std::size_t c = 0; c < 2; ++c) {
-        const double into = body.p[c] - corner[c];
-        const double nearest = std::max(std::min(into, side - into), 0.0);
-        if (sweep[c] >= nearest + grid_.outside()) return false;
+        const double inside = std::min(p[c] - square.low[c], square.high[c] - p[c]);
+        if (sweep[c] >= std::max(inside, 0.0) + outside) return false;
     }
     return true;
 }
 
-void Runner::predict_crossing(std::uint32_t i)
+/// The exit of a body that advances by a step with a polynomial: out of the margin.
+Runner::Exit Runner::exit_by_step(std::uint32_t i, const Square& square, double outside) const
 {
-    Pending& pending = pending_[i];
-    const Body& body = world_.bodies[i];
-    const auto [corner, side] = grid_.square_of(body, i, pending.cell);
-    pending.across_x = pending.across_y = 0;
-    pending.crossing = no_instant;
-    if (body.mapped) return predict_crossing_mapped(i);
-    if (body.quartic) {
-        if (stays_in_cell(body, world_.bends[i].sweep, corner, side)) return;
-        const Path path = world_.path(i, now_);
-        double first = path.until;
-        for (std::size_t c = 0; c < 2; ++c) {
-            const double into = path.c[0][c] - corner[c];
-            Polynomial gap{};
-            double reach = 0;
-            for (std::size_t k = 4; k > 0; --k) {
-                gap[k] = path.c[k][c];
-                reach = (reach + std::fabs(gap[k])) * path.until;
-            }
-            for (const double way : {into, side - into}) {
-                gap[0] = std::max(way, 0.0) + grid_.outside();
-                if (reach >= gap[0]) first = std::min(first, falls_within(gap, 4, first, 0));
-                for (std::size_t k = 1; k < 5; ++k) gap[k] = -gap[k];
-            }
+    if (stays_in(square, outside, world_.bodies[i].p, world_.bends[i].sweep)) return {};
+    const Path path = world_.path(i, now_);
+    double first = path.until;
+    for (std::size_t c = 0; c < 2; ++c) {
+        Polynomial gap{};
+        double reach = 0;
+        for (std::size_t k = 4; k > 0; --k) {
+            gap[k] = path.c[k][c];
+            reach = (reach + std::fabs(gap[k])) * path.until;
         }
-        if (first < path.until) pending.crossing = now_.after(first);
-        return;
+        for (const double way : {path.c[0][c] - square.low[c], square.high[c] - path.c[0][c]}) {
+            gap[0] = std::max(way, 0.0) + outside;
+            if (reach >= gap[0]) first = std::min(first, falls_within(gap, 4, first, 0));
+            for (std::size_t k = 1; k < 5; ++k) gap[k] = -gap[k];
+        }
     }
+    return {first < path.until ? now_.after(first) : no_instant};
+}
+
+/// The exit of a body of a system out of the margin, as proved by the bound.
+Runner::Exit Runner::exit_by_bound(std::uint32_t i, const Square& square, double outside) const
+{
+    const double most = world_.accelerations[i];
+    const Path path = world_.path(i, now_);
+    double first = path.until;
+    for (std::size_t c = 0; c < 2; ++c) {
+        const double v = path.c[1][c];
+        const double down = std::max(path.c[0][c] - square.low[c], 0.0) + outside;
+        const double up = std::max(square.high[c] - path.c[0][c], 0.0) + outside;
+        first = std::min(first, falls_after(down, v, -most, 0));
+        first = std::min(first, falls_after(up, -v, -most, 0));
+    }
+    return {first < path.until ? now_.after(first) : no_instant};
+}
+
+/// Where a body leaves a square; it may already be a rounding outside.
+Runner::Exit Runner::exit_of(std::uint32_t i, const Square& square, double outside) const
+{
+    const Body& body = world_.bodies[i];
+    if (body.mapped) return exit_by_bound(i, square, outside);
+    if (body.quartic) return exit_by_step(i, square, outside);
     const double since = seconds(body.t, now_);
     const Vector2 p = place(body, since);
     const Vector2 velocity = speed(body, since);
     Vector2 after{never, never};
     std::array<std::int8_t, 2> way{};
     for (std::size_t c = 0; c < 2; ++c) {
-        const double into = p[c] - corner[c];
         const double v = velocity[c];
         const double a = body.a[c];
+        const double below = p[c] - square.low[c];
+        const double above = square.high[c] - p[c];
         if (a == 0) {  // as below, by values: the sign of the velocity cannot be predicted
             way[c] = v < 0 ? -1 : 1;
-            const double gap = std::max(v < 0 ? into : side - into, 0.0);
+            const double gap = std::max(v < 0 ? below : above, 0.0);
             after[c] = v != 0 ? gap / std::fabs(v) : never;
             continue;
         }
-        const double down = v > 0 && a >= 0 ? never : falls_after(into, v, a, 0);
-        const double up = v < 0 && a <= 0 ? never : falls_after(side - into, -v, -a, 0);
+        const bool falls = below < never && !(v > 0 && a >= 0);
+        const bool rises = above < never && !(v < 0 && a <= 0);
+        const double down = falls ? falls_after(below, v, a, 0) : never;
+        const double up = rises ? falls_after(above, -v, -a, 0) : never;
         after[c] = std::min(down, up);
         way[c] = down <= up ? -1 : 1;
     }
     const bool vertical = after[1] < after[0];
-    pending.across_x = vertical ? std::int8_t{0} : way[0];
-    pending.across_y = vertical ? way[1] : std::int8_t{0};
     const double first = vertical ? after[1] : after[0];
-    if (first < never) pending.crossing = now_.after(first);
+    if (!(first < never)) return {};
+    return {now_.after(first), vertical ? std::int8_t{0} : way[0],
+            vertical ? way[1] : std::int8_t{0}};
 }
 
-/// Predicts a crossing to a tenth of a cell outside, as proved by the bound.
-void Runner::predict_crossing_mapped(std::uint32_t i)
+void Runner::predict_crossing(std::uint32_t i)
 {
     Pending& pending = pending_[i];
-    const auto [corner, side] = grid_.square_of(world_.bodies[i], i, pending.cell);
-    const double most = world_.accelerations[i];
-    const Path path = world_.path(i, now_);
-    double first = path.until;
-    for (std::size_t c = 0; c < 2; ++c) {
-        const double into = path.c[0][c] - corner[c];
-        const double v = path.c[1][c];
-        const double down = std::max(into, 0.0) + grid_.outside();
-        const double up = std::max(side - into, 0.0) + grid_.outside();
-        first = std::min(first, falls_after(down, v, -most, 0));
-        first = std::min(first, falls_after(up, -v, -most, 0));
-    }
-    if (first < path.until) pending.crossing = now_.after(first);
+    const Square square = grid_.square_of(world_.bodies[i], i, pending.cell);
+    const Exit exit = exit_of(i, square, grid_.outside());
+    pending.crossing = exit.t;
+    pending.across_x = exit.x;
+    pending.across_y = exit.y;
 }
 
-/// Moves a body into the cell to which a step has led it.
+void Runner::predict_leaving(std::uint32_t i)
+{
+    OnTerrain& place = terrain_[i];
+    const FaceTree& terrain = grid_.terrain(world_.bodies[i]);
+    place.exit = exit_of(i, terrain.square(place.square), terrain.outside());
+}
+
+/// Moves a body into the cell and the square of terrain to which a step has led it.
 void Runner::move_to_cell(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
-    const bool later = body.mapped || before(body.t, now_);
-    grid_.move(world_.bodies, i, pending_[i].cell,
-               later ? world_.path(i, before(now_, body.t) ? body.t : now_).c[0] : body.p);
+    if (!celled_ && !on_terrain_) return;
+    const Vector2 p = place_now(i);
+    if (celled_) grid_.move(world_.bodies, i, pending_[i].cell, p);
+    if (on_terrain_) terrain_[i].square = grid_.terrain(body).at(p);
 }
 
 void Runner::cross(std::uint32_t i)
@@ -411,10 +542,33 @@ void Runner::cross(std::uint32_t i)
     const bool was_away = is_away_from_walls(i);
     grid_.step(world_.bodies, i, pending.cell, x, y);
     if (was_away) consider_walls(i);
-    consider_faces(i);
     grid_.each_ahead(world_.bodies, i, pending.cell, x, y,
                      [&](std::uint32_t j) { consider_body(i, j); });
     predict_crossing(i);
+    put_in_calendar(i);
+}
+
+/// Moves a body into the next square of terrain, and considers the faces that it could not touch
+/// before.
+void Runner::leave_square(std::uint32_t i)
+{
+    ++world_.statistics.crossings;
+    OnTerrain& own = terrain_[i];
+    const Body& body = world_.bodies[i];
+    if (body.quartic) return predict(i);
+    FaceTree& terrain = grid_.terrain(body);
+    const std::uint32_t before = own.square;
+    const Vector2 p = place(body, seconds(body.t, now_));
+    own.square = terrain.beyond(before, p, own.exit.x != 0 ? 0 : 1, own.exit.x + own.exit.y > 0);
+    const std::vector<std::uint32_t>& known = terrain.faces(before);
+    auto next = known.begin();
+    for (const std::uint32_t f : terrain.faces(own.square)) {
+        next = std::lower_bound(next, known.end(), f);
+        if (next != known.end() && *next == f) continue;
+        if (known_to_group(i, true, f)) continue;
+        consider(i, meet_face(world_, i, f), true, f);
+    }
+    predict_leaving(i);
     put_in_calendar(i);
 }
 

@@ -81,8 +81,22 @@ private:
         std::int8_t across_x = 0, across_y = 0;
         Cells::Cell cell{};
     };
+    /// Where a body leaves a square, and over which side: -1, 0 or 1 along x and y.
+    struct Exit {
+        Instant t = no_instant;
+        std::int8_t x = 0, y = 0;
+    };
+    /// The square of terrain of a body, see `FaceTree`.
+    struct OnTerrain {
+        std::uint32_t square = 0;
+        Exit exit{};
+    };
 
     void place_all();
+    void fill_cells();
+    [[nodiscard]] Vector2 place_now(std::uint32_t i) const;
+    void lay_cells_again();
+    void watch_work();
     void settle_at_start();
     void predict(std::uint32_t i);
     void consider(std::uint32_t i, const Meeting& meeting, bool surface, std::uint32_t other)
@@ -103,13 +117,27 @@ private:
     void consider_moving(std::uint32_t i);
     void consider_own(std::uint32_t i);
     void offer(std::uint32_t i);
-    [[nodiscard]] bool stays_in_cell(const Body& body, const Vector2& sweep, const Vector2& corner,
-                                     double side) const;
+    [[nodiscard]] Exit exit_of(std::uint32_t i, const Square& square, double outside) const;
+    [[nodiscard]] Exit exit_by_step(std::uint32_t i, const Square& square, double outside) const;
+    [[nodiscard]] Exit exit_by_bound(std::uint32_t i, const Square& square, double outside) const;
     void predict_crossing(std::uint32_t i);
-    void predict_crossing_mapped(std::uint32_t i);
+    void predict_leaving(std::uint32_t i);
     void put_in_calendar(std::uint32_t i);
     void move_to_cell(std::uint32_t i);
     void cross(std::uint32_t i);
+    void leave_square(std::uint32_t i);
+    /// Whether the next act of a body is to leave its square of terrain.
+    [[nodiscard]] bool leaves_first(std::uint32_t i) const
+    {
+        if (!on_terrain_) return false;
+        const Instant& t = terrain_[i].exit.t;
+        return before(t, pending_[i].t) && before(t, pending_[i].crossing);
+    }
+    /// The faces of terrain that a body can touch before it leaves its square.
+    [[nodiscard]] const std::vector<std::uint32_t>& faces_of(std::uint32_t i) const
+    {
+        return grid_.terrain(world_.bodies[i]).faces(terrain_[i].square);
+    }
     [[nodiscard]] bool is_cancelled() const
     {
         const auto* cancelled = world_.options.cancelled;
@@ -181,6 +209,12 @@ private:
     void count_held();
     void sample_until(const Instant& t, bool inclusive, Samples& samples);
     void fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::string message);
+    /// Shows new events to the observer, if there is one.
+    void show_events()
+    {
+        if (world_.options.observe && result_.events.size() > shown_) show_new_events();
+    }
+    void show_new_events();
     [[nodiscard]] std::string called(std::uint32_t i) const
     {
         return world_.scene.name_of(BodyId{i});
@@ -190,9 +224,18 @@ private:
     std::vector<std::uint32_t> members_;
     Instant t_end_;
     Grid grid_;
-    bool celled_ = false;
+    bool celled_ = false;          ///< whether bodies can meet each other
+    bool on_terrain_ = false;      ///< whether there is terrain that does not move
+    std::vector<Vector2> places_;  ///< of members, while cells are laid
     Calendar calendar_;
     OfGroup<Pending> pending_;
+    OfGroup<OnTerrain> terrain_;  ///< where there is any
+    struct Work {
+        std::uint64_t tests = 0, crossings = 0, events = 0;  ///< at the start of the present count
+        std::uint64_t left = 0;                              ///< acts until the next look
+        std::uint64_t interval = 0;                          ///< acts from look to look
+        double least = 0;  ///< work an event since cells were laid; 0: not known yet
+    } work_;
     std::vector<std::uint32_t> slots_;
     std::vector<std::uint32_t> islands_;
     Impacts impacts_;
@@ -221,6 +264,7 @@ private:
     std::uint32_t unmoved_ = 0;  ///< consecutive predicted impacts that moved nothing
     std::uint64_t idle_ = 0;     ///< consecutive acts at one time
     std::size_t next_sample_ = 0;
+    std::size_t shown_ = 0;  ///< of the events, to the observer
     GroupResult result_;
 };
 

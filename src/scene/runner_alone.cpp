@@ -61,7 +61,8 @@ std::optional<Runner::Strike> Runner::strike_on_wall(const Body& body, const Vec
     const double approach = -dot(arrives, wall.normal);
     const double restitution = world_.restitution(body.material, wall.material);
     Strike strike{.arrives = arrives, .leaves = {}, .impulse = {}};
-    const double size = (1 + restitution) * approach * (1 / body.inverse_mass);
+    const double whole = (1 + restitution) * approach * (1 / body.inverse_mass);
+    const double size = whole - whole * excess_of_square(wall.normal);
     strike.impulse = size * wall.normal;
     strike.leaves = arrives + body.inverse_mass * strike.impulse;
     const double least = std::max(resolution(t) * norm(world_.gravity), noise(strike.leaves, {}));
@@ -79,6 +80,8 @@ void Runner::record(std::uint32_t i, const Strike& strike)
         SceneEvent event{
             .t = now_.value, .number = result_.event_count, .body = i, .impulse = strike.impulse};
         event.other = {true, world_.faces[0].surface};
+        event.normal = world_.faces[0].normal;
+        event.at = world_.position(i, now_) - world_.bodies[i].radius * event.normal;
         event.before[0] = strike.arrives;
         event.after[0] = strike.leaves;
         result_.events.push_back(event);
@@ -164,7 +167,10 @@ void Runner::bounce(std::uint32_t i)
             event.before[0] = slip * along - leaves * wall.normal;
             event.impulse = ((1 + restitution) * leaves / body.inverse_mass) * wall.normal;
             event.after[0] = slip * along + (restitution * leaves) * wall.normal;
+            event.normal = wall.normal;
+            event.at = body.p + moved * along - body.radius * wall.normal;
             result_.events.push_back(event);
+            if (result_.events.size() % 4096 == 0) show_events();
         }
         leaves *= restitution;
     }

@@ -15,6 +15,9 @@ namespace {
 /// Steps during which a group has been in several parts before it is divided.
 constexpr std::uint32_t patience_to_divide = 3;
 
+/// [radii] Distance of terrain from the centre of a disc up to which its group knows it.
+constexpr double ahead = 5;
+
 }  // namespace
 
 /// Whether the group of a body meets this face or body itself.
@@ -66,10 +69,13 @@ std::vector<std::uint32_t> Runner::faces_near(const std::vector<std::uint32_t>& 
         });
         if (touched) faces.push_back(f);
     }
-    if (!celled_ || !grid_.any_faces()) return faces;
+    if (!on_terrain_) return faces;
+    // Those that a member will roll onto soon; it joins a new group where it comes to another one.
     for (const std::uint32_t i : members) {
-        grid_.each_face_near(world_.bodies[i], pending_[i].cell,
-                             [&](std::uint32_t face) { faces.push_back(face); });
+        const Body& body = world_.bodies[i];
+        const Vector2 p = world_.position(i, now_);
+        const double near = ahead * body.radius + 1e-6 * norm(p);
+        grid_.terrain(body).append_within(p, near, faces);
     }
     std::ranges::sort(faces);
     faces.erase(std::unique(faces.begin(), faces.end()), faces.end());
@@ -188,7 +194,7 @@ void Runner::plan_group(std::uint32_t number)
             break;
     }
     for (const std::uint32_t i : group.members) {
-        if (celled_) move_to_cell(i);
+        move_to_cell(i);
         predict(i);
     }
 }
@@ -321,7 +327,7 @@ void Runner::set_free(const std::vector<std::uint32_t>& bodies)
                       before(end, t_end_) ? end : no_instant);
     }
     for (const std::uint32_t i : bodies) {
-        if (celled_) move_to_cell(i);
+        move_to_cell(i);
         predict(i);
     }
 }

@@ -93,11 +93,11 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
 {
     std::vector<Side> sides;
     const Body& body = world_.bodies[i];
-    if (body.radius > 0 || !celled_ || !grid_.any_faces()) return sides;
+    if (body.radius > 0 || !on_terrain_) return sides;
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = world_.velocity(i, now_);
     const double flown = rounding_of_flight(body, seconds(body.t, now_));
-    for (const std::uint32_t f : grid_.faces(body)) {
+    for (const std::uint32_t f : faces_of(i)) {
         const Face& face = world_.faces[f];
         if (face.kind != Face::Kind::segment) continue;
         const bool above = world_.arrives_above(body, f, p, v);
@@ -128,6 +128,9 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
         contact.normal = normal;
         contact.at = p - body.radius * normal;
+        if (world_.faces[f].kind == Face::Kind::vertex && body.radius > 0) {
+            contact.blur = World::rounding(p, body.radius) / body.radius;
+        }
         contact.restitution = world_.restitution(body.material, world_.faces[f].material);
         contact.friction = world_.friction(body.material, world_.faces[f].material);
         cluster_.contacts.push_back(contact);
@@ -158,8 +161,8 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         }
         touch(side.face, side.above ? face.normal : -1.0 * face.normal);
     }
-    if (body.radius > 0 && celled_ && grid_.any_faces()) {
-        for (const std::uint32_t f : grid_.faces(body)) look(f);
+    if (body.radius > 0 && on_terrain_) {
+        for (const std::uint32_t f : faces_of(i)) look(f);
     }
     const auto count = static_cast<std::uint32_t>(world_.faces.size());
     for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
@@ -237,6 +240,7 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     contact.slot_b = slot_of(j);
     contact.normal = normal;
     contact.at = 0.5 * (pa + pb);
+    contact.blur = (World::rounding(pa, reach) + World::rounding(pb, reach)) / reach;
     contact.restitution = world_.restitution(a.material, b.material);
     contact.friction = world_.friction(a.material, b.material);
     cluster_.contacts.push_back(contact);

@@ -24,8 +24,8 @@ std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
         }
     };
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
-    if (celled_ && grid_.any_faces()) {
-        for (const std::uint32_t f : grid_.faces(body)) look(f);
+    if (on_terrain_) {
+        for (const std::uint32_t f : faces_of(i)) look(f);
     }
     return faces;
 }

@@ -89,17 +89,18 @@ namespace {
 /// One pass over all groups; a failure of one group ends the others at that time, in another
 /// pass.
 SceneRun run_until(const Scene& scene, const SceneOptions& options, const SceneTuning& tuning,
-                   double t_end, Failure* first)
+                   bool keeps_events, double t_end, Failure* first)
 {
     SceneRun run;
     World world(scene, options);
     world.tuning = tuning;
+    world.keeps_events = keeps_events;
     const auto failure = run_groups(world, t_end, run);
     if (failure && failure->t.value < t_end &&
         world.statistics.groups + world.statistics.alone > 1 &&
         failure->outcome != Outcome::cancelled) {
         *first = *failure;
-        return run_until(scene, options, tuning, failure->t.value, first);
+        return run_until(scene, options, tuning, keeps_events, failure->t.value, first);
     }
     if (failure) *first = *failure;
     const Instant end = failure ? failure->t : Instant{t_end, 0};
@@ -206,13 +207,15 @@ SceneRun detail::simulate(const Scene& scene, const SceneOptions& wanted, const 
     validate(wanted);
     SceneOptions options = wanted;
     // The times of events determine the last one.
-    options.record_events |= wanted.max_events != SceneOptions{}.max_events;
+    const bool limited = wanted.max_events != SceneOptions{}.max_events && !wanted.observe;
+    options.record_events |= limited || wanted.observe;
+    const bool keeps_events = wanted.record_events || !wanted.observe;
     scene.check(options.t_start);
     require_resolved(scene, options);
     scene.require_room(0);
     Failure failure;
-    SceneRun run = run_until(scene, options, tuning, options.t_end, &failure);
-    if (run.statistics.events > options.max_events) {
+    SceneRun run = run_until(scene, options, tuning, keeps_events, options.t_end, &failure);
+    if (run.statistics.events > options.max_events && keeps_events) {
         // Each group has counted by itself: the time of the last event wanted ends all.
         std::vector<double> times;
         std::uint64_t last = ~0ULL;
@@ -229,7 +232,7 @@ SceneRun detail::simulate(const Scene& scene, const SceneOptions& wanted, const 
                    {},
                    fmt::format("max_events = {} events have happened", options.max_events)};
         Failure later;
-        run = run_until(scene, options, tuning, end, &later);
+        run = run_until(scene, options, tuning, keeps_events, end, &later);
     }
     run.outcome = failure.outcome;
     run.message = failure.message;

@@ -44,6 +44,13 @@ namespace ricochet::detail {
     return {-a[1], a[0]};
 }
 
+/// |n|^2 - 1 for a vector of length 1 up to rounding, where the sum of squares itself would have
+/// lost it.
+[[nodiscard]] inline double excess_of_square(const Vector2& n) noexcept
+{
+    return std::fma(n[0], n[0], std::fma(n[1], n[1], -1.0));
+}
+
 /// The point of the segment from a to b that is nearest to p.
 [[nodiscard]] inline Vector2 nearest_on(const Vector2& a, const Vector2& b,
                                         const Vector2& p) noexcept

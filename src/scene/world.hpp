@@ -126,6 +126,7 @@ struct World {
     const Scene& scene;
     const SceneOptions& options;
     SceneTuning tuning;
+    bool keeps_events = true;  ///< where they are recorded: not only for the observer
     Vector2 gravity{};
     std::vector<Body> bodies;
     struct Bend {

@@ -171,6 +171,20 @@ TEST_F(EnsembleApp, ResultsAreTheSameForAnyThreadsAndShares)
     EXPECT_NE(table("other")[70], table("one")[70]);
 }
 
+TEST_F(EnsembleApp, SharesOfFewRowsAllHaveSome)
+{
+    // A hundred rows are fewer than two blocks of 64.
+    for (int k = 1; k <= 4; ++k) {
+        const std::string share = std::to_string(k) + "/4";
+        const Result result = run(balls("100", {"--out", "four", "--share", share, "--json"}));
+        ASSERT_EQ(result.status, 0) << result.err;
+        EXPECT_EQ(nlohmann::json::parse(result.out).at("rows"), 25) << share;
+    }
+    expect_fine({"ensemble", "--merge", "four"});
+    expect_fine(balls("100", {"--out", "whole"}));
+    EXPECT_EQ(results("four"), results("whole"));
+}
+
 TEST_F(EnsembleApp, ACompleteShareIsSkipped)
 {
     const Words words = balls("200", {"--out", "out", "--json"});

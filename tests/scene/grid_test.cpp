@@ -91,7 +91,7 @@ TEST(Rings, CoverEveryPlaceFromWhichABodyCanTouchOnceAndLeaveNothing)
     std::mt19937 generator(3);
     std::uniform_real_distribution<double> uniform(-1, 1);
     Cells cells;
-    cells.size(0.5, 64, 64);
+    cells.size(0.5, 64, 64, false);
     const double radius = 0.2;
     for (const double big : {0.3, 1.0, 4.7, 11.0}) {
         Rings rings;
@@ -142,8 +142,10 @@ TEST(Grid, MakesThoseBigThatCostMoreInTheCellsOfAll)
         World world(scene, options);
         std::vector<std::uint32_t> members(world.bodies.size());
         for (std::uint32_t i = 0; i < members.size(); ++i) members[i] = i;
+        std::vector<Vector2> places;
+        for (const Body& body : world.bodies) places.push_back(body.p);
         Grid grid;
-        grid.size(world, members, false);
+        grid.size(world, members, places, false);
         return std::ranges::count_if(world.bodies, &Body::big);
     };
     EXPECT_EQ(big_of(mixed(2000, 4, 20, 0.3)), 4);
@@ -238,6 +240,241 @@ TEST(Grid, AMixedGasCollidesAsByBruteForceInLongDouble)
     test::BruteForce exact(scene);
     for (std::size_t k = 0; k < 60; ++k) {
         EXPECT_NEAR(run.events[k].t, static_cast<double>(exact.next()), 1e-12) << k;
+    }
+}
+
+/// Discs and points above terrain, some with drag, under gravity.
+Scene above_terrain(std::size_t count, std::size_t segments)
+{
+    Scene scene({.gravity = {0, -1}});
+    const MaterialId stone = scene.material({.restitution = 0.9});
+    scene.wall({.normal = {1, 0}});
+    scene.wall({.point = {10, 0}, .normal = {-1, 0}});
+    std::vector<Vector2> points;
+    for (std::size_t k = 0; k <= segments; ++k) {
+        const double x = 12.0 * static_cast<double>(k) / static_cast<double>(segments) - 1;
+        points.push_back({x, 0.3 * std::sin(3 * x) + 0.02 * std::sin(40 * x)});
+    }
+    scene.terrain({.points = points, .material = stone});
+    std::mt19937 generator(6);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (std::size_t i = 0; i < count; ++i) {
+        const Vector2 at{0.3 + 0.3 * static_cast<double>(i % 32),
+                         1 + 0.3 * static_cast<double>(i / 32) + 0.02 * uniform(generator)};
+        const Vector2 velocity{uniform(generator), uniform(generator)};
+        const double drag = i % 5 == 0 ? 0.05 : 0.0;
+        if (i % 3 == 0) {
+            scene.point({.at = at, .velocity = velocity, .drag = drag});
+        } else {
+            scene.disc({.at = at, .velocity = velocity, .radius = 0.03, .drag = drag});
+        }
+    }
+    return scene;
+}
+
+TEST(Grid, ChangesNoBitWhateverItsSideAndHoweverOftenItIsLaid)
+{
+    const std::vector<Scene> scenes{test::gas({.count = 200, .gravity = {0.1, -1}, .spread = 0.3}),
+                                    above_terrain(80, 150), mixed(300, 2, 12, 0.3)};
+    for (const Scene& scene : scenes) {
+        const SceneOptions options{.t_end = 4, .max_events = 500};
+        const SceneRun one = simulate(scene, options);
+        EXPECT_GT(one.events.size(), 150U) << one.message;
+        for (const double side : {0.02, 0.15, 1.0, 30.0}) {
+            expect_same(one, simulate(scene, options, {.cell_side = side}));
+        }
+        for (const std::uint64_t acts : {20U, 333U}) {
+            const SceneRun run = simulate(scene, options, {.lay_after = acts});
+            EXPECT_GT(run.statistics.layings, 1U);
+            expect_same(one, run);
+        }
+    }
+}
+
+/// First contacts tested, and crossings, per event.
+double work_each(const SceneRun& run)
+{
+    const SceneStatistics& s = run.statistics;
+    return static_cast<double>(s.predictions + 3 * s.crossings) / static_cast<double>(s.events);
+}
+
+/// 400 discs in a box of 40: in its middle, or all over it while two walls close in on them.
+Scene in_void(bool contracts)
+{
+    Scene scene;
+    scene.wall({.point = {0, 0}, .normal = {1, 0}});
+    scene.wall({.point = {0, 0}, .normal = {0, 1}});
+    const double speed = contracts ? -1 : 0;
+    scene.wall({.point = {40, 40}, .normal = {-1, 0}, .motion = ConstantVelocity{{speed, 0}}});
+    scene.wall({.point = {40, 40}, .normal = {0, -1}, .motion = ConstantVelocity{{0, speed}}});
+    std::mt19937 generator(9);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    const double wide = contracts ? 36 : 1;
+    for (int i = 0; i < 400; ++i) {
+        const Vector2 at{(i % 20 + 0.5) / 20 - 0.5, (i / 20 + 0.5) / 20 - 0.5};
+        scene.disc({.at = {20 + wide * at[0], 20 + wide * at[1]},
+                    .velocity = {0.2 * uniform(generator), 0.2 * uniform(generator)},
+                    .radius = 0.015});
+    }
+    return scene;
+}
+
+TEST(Grid, FollowsAGasThatExpandsAndOneThatContracts)
+{
+    for (const bool contracts : {false, true}) {
+        const Scene scene = in_void(contracts);
+        const SceneOptions options{.t_end = contracts ? 38.0 : 150.0, .record_events = false};
+        const double at_start = 0.65 * (contracts ? 36 : 1) / 20;
+        const SceneRun held = simulate(scene, options, {.cell_side = at_start});
+        const SceneRun run = simulate(scene, options);
+        EXPECT_GE(run.statistics.layings, 1U);
+        EXPECT_EQ(run.statistics.events, held.statistics.events);
+        EXPECT_LT(work_each(run), 0.7 * work_each(held)) << (contracts ? "contracts" : "expands");
+    }
+}
+
+TEST(Grid, IsNotSpoiledByABodyFarAway)
+{
+    // In a box of terrain, since nothing lies behind a wall.
+    Scene scene;
+    scene.terrain({.points = {{0, 0}, {1, 0}, {1, 1}, {0, 1}, {0, 0}}});
+    const Scene others = test::gas({.count = 400});
+    for (const Disc& disc : others.bodies()) {
+        scene.disc({.at = disc.at, .velocity = disc.velocity, .radius = disc.radius});
+    }
+    const SceneOptions options{.t_end = 0.5, .record_events = false};
+    const double without = work_each(simulate(scene, options));
+    scene.disc({.at = {1e4, 1e4}, .velocity = {-1, 0}, .radius = 0.01});
+    scene.disc({.at = {1e4, 1e4 + 1}, .velocity = {1, 0}, .radius = 0.01});
+    EXPECT_LT(work_each(simulate(scene, options)), 1.2 * without);
+}
+
+TEST(Grid, TestsNoPointAgainstAnother)
+{
+    Scene scene;
+    for (const Vector2& normal : {Vector2{0, 1}, Vector2{1, 0}, Vector2{0, -1}, Vector2{-1, 0}}) {
+        const Vector2 corner{normal[0] < 0 ? 1.0 : 0.0, normal[1] < 0 ? 1.0 : 0.0};
+        scene.wall({.point = corner, .normal = normal});
+    }
+    std::mt19937 generator(8);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    for (int i = 0; i < 500; ++i) {
+        scene.point({.at = {uniform(generator), uniform(generator)},
+                     .velocity = {uniform(generator) - 0.5, uniform(generator) - 0.5}});
+    }
+    const SceneOptions options{.t_end = 20};
+    const SceneRun alone = simulate(scene, options);
+    EXPECT_EQ(alone.statistics.alone, 500U);
+    // Of four walls no more than two are approached.
+    EXPECT_LE(work_each(alone), 3.0);
+    // With terrain they are one group, which has no cells.
+    scene.terrain({.points = {{0.4, 0.5}, {0.6, 0.5}}});
+    const SceneRun one_group = simulate(scene, options);
+    EXPECT_EQ(one_group.statistics.groups, 1U);
+    EXPECT_LE(work_each(one_group), 6.0);
+    // With few discs points are tested against these alone.
+    scene.disc({.at = {0.5, 0.7}, .radius = 0.02});
+    scene.disc({.at = {0.3, 0.2}, .velocity = {0.1, 0}, .radius = 0.02});
+    EXPECT_LE(work_each(simulate(scene, options)), 40.0);
+}
+
+TEST(FaceTree, HasEveryFaceThatCanBeTouched)
+{
+    const Scene scene = above_terrain(1, 500);
+    const SceneOptions options{.t_end = 1};
+    const World world(scene, options);
+    std::mt19937 generator(10);
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (const double radius : {0.0, 1e-3, 0.1, 3.0}) {
+        FaceTree tree;
+        tree.lay(world, radius);
+        double faces = 0;
+        for (int k = 0; k < 3000; ++k) {
+            // Some far from terrain, some on it.
+            const double x = 5 + 7 * uniform(generator);
+            const double height = k % 3 == 0 ? 5.0 : k % 3 == 1 ? 0.5 : radius;
+            const Vector2 p{x, 0.3 * std::sin(3 * x) + height * uniform(generator)};
+            const std::uint32_t square = tree.at(p);
+            const auto [low, high] = tree.square(square);
+            for (std::size_t c = 0; c < 2; ++c) {
+                ASSERT_LE(low[c], p[c]);
+                ASSERT_LT(p[c], high[c]);
+            }
+            const std::vector<std::uint32_t>& near = tree.faces(square);
+            EXPECT_TRUE(std::ranges::is_sorted(near));
+            std::vector<std::uint32_t> within;
+            tree.append_within(p, radius, within);
+            const std::set<std::uint32_t> found(within.begin(), within.end());
+            for (std::uint32_t f = world.wall_count; f < world.fixed_count; ++f) {
+                const Face& face = world.faces[f];
+                const Vector2 end = face.at - face.length * turned(face.normal);
+                const double apart = norm(p - nearest_on(face.at, end, p));
+                EXPECT_EQ(found.contains(f), apart <= radius);
+                if (apart > radius + tree.outside()) continue;
+                EXPECT_TRUE(std::ranges::binary_search(near, f)) << radius << " " << f;
+            }
+            faces += static_cast<double>(near.size());
+        }
+        if (radius < 0.01) {
+            EXPECT_LT(faces / 3000, 12);
+        }
+    }
+}
+
+TEST(FaceTree, LeadsFromSquareToSquareWithoutGaps)
+{
+    const Scene scene = above_terrain(1, 500);
+    const SceneOptions options{.t_end = 1};
+    const World world(scene, options);
+    FaceTree tree;
+    tree.lay(world, 0.01);
+    std::mt19937 generator(11);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    // From side to side: each square begins where the one before it ends.
+    for (const std::size_t axis : {0U, 1U}) {
+        for (const bool upwards : {true, false}) {
+            Vector2 p{10 * uniform(generator), 0.3 * uniform(generator)};
+            p[axis] = upwards ? -100.0 : 100.0;
+            std::uint32_t square = tree.at(p);
+            int count = 0;
+            for (; count < 10'000; ++count) {
+                const double edge =
+                    upwards ? tree.square(square).high[axis] : tree.square(square).low[axis];
+                if (!std::isfinite(edge)) break;
+                p[axis] = edge;
+                const std::uint32_t next = tree.beyond(square, p, axis, upwards);
+                ASSERT_NE(next, square);
+                const Square& there = tree.square(next);
+                EXPECT_EQ(upwards ? there.low[axis] : there.high[axis], edge);
+                square = next;
+            }
+            EXPECT_GT(count, 4);
+            EXPECT_LT(count, 10'000);
+        }
+    }
+}
+
+TEST(FaceTree, ABallMeetsFewFacesWhateverItsSizeAndTheirNumber)
+{
+    // In a polygon a ball of any radius tests as few faces; a thousand times as many sides cost the
+    // crossings of ten more halvings. A ball of 0.1 reaches thousands of 30 000 sides at a time.
+    for (const std::size_t sides : {30U, 1000U, 30'000U}) {
+        for (const double radius : {1e-5, 1e-3, 0.1}) {
+            if (static_cast<double>(sides) * radius > 1000) continue;
+            Scene scene;
+            std::vector<Vector2> points;
+            for (std::size_t k = 0; k < sides; ++k) {
+                const double angle =
+                    2 * std::numbers::pi * static_cast<double>(k) / static_cast<double>(sides);
+                points.push_back({std::cos(angle), std::sin(angle)});
+            }
+            points.push_back(points[0]);
+            scene.terrain({.points = points});
+            scene.disc({.at = {0.1, 0.2}, .velocity = {0.7, 0.4}, .radius = radius});
+            const SceneRun run = simulate(scene, {.t_end = 1000});
+            EXPECT_GT(run.statistics.events, 300U);
+            EXPECT_LT(work_each(run), 300) << sides << " sides, radius " << radius;
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -24,30 +25,6 @@ enum class ImpactLaw {
 
 /// Maker of groups of bodies in lasting contact, see `scene_contacts()`.
 class SceneContacts;
-
-/// Options of a run of a scene.
-struct SceneOptions {
-    double t_start = 0;                                       ///< [s]
-    double t_end = std::numeric_limits<double>::quiet_NaN();  ///< [s] above t_start
-    double rtol = 1e-8;  ///< of bodies with springs or drag, as in `Options`
-    double atol = 1e-10;
-    ImpactLaw impacts = ImpactLaw::waves;
-
-    /// [s] Contact time of the TC model; 0: off. An impact is elastic if one of its bodies had an
-    /// impact less than this long ago (S. Luding and S. McNamara, How to handle the inelastic
-    /// collapse of a dissipative hard-sphere gas with the TC model, Granular Matter 1, 1998).
-    double elastic_within = 0;
-
-    /// `scene_contacts()` of `ricochet::scene_contact`. Without it a run ends with `Outcome::zeno`
-    /// where bodies stay in contact with each other.
-    const SceneContacts* contacts = nullptr;
-    double contact_step = 1e-3;  ///< [s] step of groups in lasting contact; order 1
-
-    bool record_events = true;           ///< off: events are counted, not kept
-    std::vector<double> sample_times{};  ///< [s] ascending; they do not affect the motion
-    std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();
-    const std::atomic<bool>* cancelled = nullptr;  ///< set by another thread to end the run
-};
 
 /// The second body, or the surface, of an event.
 struct Partner {
@@ -76,6 +53,44 @@ struct SceneEvent {
     Vector2 impulse{};                ///< [N s] on `body`; the opposite acts on the other
     std::array<Vector2, 2> before{};  ///< [m/s] velocities of body and other
     std::array<Vector2, 2> after{};
+    Vector2 at{};      ///< [m] place of an impact
+    Vector2 normal{};  ///< of an impact: the direction in which `body` is pushed, of length 1
+
+    /// [m/s] Relative speed before an impact along the normal; negative if the two move apart.
+    [[nodiscard]] double approach() const noexcept
+    {
+        return -(before[0][0] - before[1][0]) * normal[0] -
+               (before[0][1] - before[1][1]) * normal[1];
+    }
+};
+
+/// Options of a run of a scene.
+struct SceneOptions {
+    double t_start = 0;                                       ///< [s]
+    double t_end = std::numeric_limits<double>::quiet_NaN();  ///< [s] above t_start
+    double rtol = 1e-8;  ///< of bodies with springs or drag, as in `Options`
+    double atol = 1e-10;
+    ImpactLaw impacts = ImpactLaw::waves;
+
+    /// [s] Contact time of the TC model; 0: off. An impact is elastic if one of its bodies had an
+    /// impact less than this long ago (S. Luding and S. McNamara, How to handle the inelastic
+    /// collapse of a dissipative hard-sphere gas with the TC model, Granular Matter 1, 1998).
+    double elastic_within = 0;
+
+    /// `scene_contacts()` of `ricochet::scene_contact`. Without it a run ends with `Outcome::zeno`
+    /// where bodies stay in contact with each other.
+    const SceneContacts* contacts = nullptr;
+    double contact_step = 1e-3;  ///< [s] step of groups in lasting contact; order 1
+
+    bool record_events = true;           ///< off: events are counted, not kept
+    std::vector<double> sample_times{};  ///< [s] ascending; they do not affect the motion
+    std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();
+    const std::atomic<bool>* cancelled = nullptr;  ///< set by another thread to end the run
+
+    /// Called with every event, in the order of time, when it has happened; with `record_events`
+    /// off no event is kept in memory. All bodies are then one group. What it throws, `simulate`
+    /// throws.
+    std::function<void(const SceneEvent&)> observe{};
 };
 
 /// State of a body at one time.
@@ -94,6 +109,8 @@ struct SceneStatistics {
     std::uint64_t predictions = 0;  ///< searches for a first contact, of pairs and surfaces
     std::uint64_t stale = 0;        ///< predicted impacts that did not happen
     std::uint64_t crossings = 0;    ///< from cell to cell
+    std::uint64_t layings = 0;      ///< times that cells were laid again, as they had become too
+                                    ///< large or too small for a group
     std::uint64_t steps = 0;        ///< steps of islands with springs or drag
     std::uint64_t rejected = 0;
     std::uint64_t flow_calls = 0;

@@ -4,8 +4,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <system_error>
 #include <utility>
@@ -106,17 +108,18 @@ class ShareRun {
 public:
     ShareRun(const EnsembleRuns& runs, const Share& share, const fs::path& directory)
         : runs_(runs),
-          setup_(runs.setup()),
+          all_(runs.table().rows, share.count),
+          setup_(runs.setup(share.count)),
           fields_(fields_from(setup_["fields"])),
           file_(directory, share, setup_,
                 [this](std::string_view rows) { tally_.add(fields_, rows); })
     {
-        std::vector<bool> kept(runs.blocks(), false);
+        std::vector<bool> kept(all_.size(), false);
         for (const BlockPlace& place : file_.blocks()) {
             if (place.block < kept.size()) kept[place.block] = true;
         }
         for (std::size_t b = share.index - 1; b < kept.size(); b += share.count) {
-            rows_ += rows_of(b);
+            rows_ += all_.rows_of(b);
             if (!kept[b]) missing_.push_back(b);
         }
     }
@@ -124,21 +127,25 @@ public:
     /// Runs the missing blocks.
     void run(unsigned threads)
     {
-        std::vector<std::unique_ptr<std::string>> results(
-            missing_.size());  // of the current blocks
-        // Chunks of rows are blocks: only the last of the table may be shorter, and it is the last
-        // of its share.
+        // The rows of the current blocks, which several threads may run.
+        using Rows = std::array<std::string, block_rows>;
+        std::vector<std::unique_ptr<Rows>> results(missing_.size());
+        std::vector<std::once_flag> begun(missing_.size());
+        // Chunks of rows are blocks: only the last of the share may be shorter.
         const std::size_t rows =
-            missing_.empty() ? 0 : (missing_.size() - 1) * block_rows + rows_of(missing_.back());
+            missing_.empty() ? 0
+                             : (missing_.size() - 1) * block_rows + all_.rows_of(missing_.back());
         RowProgress progress;
         EnsembleOptions options{.threads = threads, .cancelled = Interrupts::flag()};
         options.progress = [&](const EnsembleProgress& now) {
             // An interrupted row is run again.
             if (Interrupts::any()) return false;
             const std::size_t chunk = now.first / block_rows;
-            const auto block = std::exchange(results[chunk], nullptr);
-            file_.append(missing_[chunk], *block);
-            tally_.add(fields_, *block);
+            const auto parts = std::exchange(results[chunk], nullptr);
+            std::string block;
+            for (const std::string& row : *parts) block += row;
+            file_.append(missing_[chunk], block);
+            tally_.add(fields_, block);
             rows_run_ += now.count;
             progress.show(now);
             return true;
@@ -147,10 +154,11 @@ public:
             rows,
             [&](const EnsembleRow& row) {
                 const std::size_t chunk = row.index / block_rows;
-                if (!results[chunk]) results[chunk] = std::make_unique<std::string>();
+                const std::size_t i = row.index % block_rows;
                 try {
-                    runs_.run_row(missing_[chunk] * block_rows + row.index % block_rows,
-                                  *results[chunk]);
+                    std::call_once(begun[chunk],
+                                   [&] { results[chunk] = std::make_unique<Rows>(); });
+                    runs_.run_row(all_.row(missing_[chunk], i), (*results[chunk])[i]);
                 } catch (...) {
                     // Apart from the runs themselves only memory can fail: this block lacks a row,
                     // and must not be kept.
@@ -165,10 +173,10 @@ public:
     /// Runs blocks numbered by `next` until there are no more, except those in `kept`.
     void run_dealt(const std::function<std::size_t()>& next, const AllBlocks& kept)
     {
-        for (std::size_t b = next(); b < runs_.blocks(); b = next()) {
+        for (std::size_t b = next(); b < all_.size(); b = next()) {
             if (kept.has(b)) continue;
             std::string block;
-            for (std::size_t i = 0; i < rows_of(b); ++i) runs_.run_row(b * block_rows + i, block);
+            for (std::size_t i = 0; i < all_.rows_of(b); ++i) runs_.run_row(all_.row(b, i), block);
             if (Interrupts::any()) return;
             file_.append(b, block);
         }
@@ -187,18 +195,14 @@ public:
     /// Writes the results where this is the only share.
     void write(const fs::path& directory) const
     {
-        AllBlocks blocks(runs_.blocks());
+        AllBlocks blocks(all_.size());
         blocks.add(directory / file_name({}), file_.blocks());
-        write_results(directory, fields_, runs_.table().rows, blocks);
+        write_results(directory, fields_, runs_.table().rows, 1, blocks);
     }
 
 private:
-    [[nodiscard]] std::size_t rows_of(std::size_t block) const
-    {
-        return std::min(block_rows, runs_.table().rows - block * block_rows);
-    }
-
     const EnsembleRuns& runs_;
+    Blocks all_;
     Json setup_;
     std::vector<Field> fields_;
     EnsembleTally tally_;
@@ -336,7 +340,7 @@ Merged read_shares(const fs::path& directory)
         if (!out.blocks) {
             out.setup = content.setup;
             const std::size_t rows = out.setup["rows"];
-            out.blocks.emplace((rows + block_rows - 1) / block_rows);
+            out.blocks.emplace(Blocks(rows, out.shares).size());
         }
         if (const std::string other = difference(content.setup, out.setup); !other.empty()) {
             throw BadInput(fmt::format("share {} in '{}' is of another set-up: {}",
@@ -359,7 +363,7 @@ int merge(const fs::path& directory, bool json)
     const std::vector<Field> fields = fields_from(all.setup["fields"]);
     for (std::size_t b = 0; b < all.blocks->size(); ++b) all.tally.add(fields, all.blocks->rows(b));
     const std::size_t rows = all.setup["rows"];
-    write_results(directory, fields, rows, *all.blocks);
+    write_results(directory, fields, rows, all.shares, *all.blocks);
     const Summary summary{.system = all.setup["system"],
                           .share = {},
                           .rows = rows,

@@ -14,7 +14,7 @@
 
 namespace ricochet::app {
 
-static_assert(block_rows == ensemble_chunk);
+static_assert(block_rows == ensemble_chunk);  // so a chunk of a share is a block
 
 namespace {
 
@@ -122,7 +122,7 @@ EnsembleRuns::EnsembleRuns(const SystemEntry& system, const RunRequest& request,
     mode_follows_ = !request.mode && system.start_mode != nullptr;
 }
 
-Json EnsembleRuns::setup() const
+Json EnsembleRuns::setup(std::size_t shares) const
 {
     Json parameters = Json::object();
     for (std::size_t i = 0; i < system_.parameters.size(); ++i) {
@@ -131,7 +131,8 @@ Json EnsembleRuns::setup() const
                         [i](const Column& c) { return c.parameter && c.index == i; });
         if (!varies) parameters[std::string(system_.parameters[i].name)] = settings_.parameters[i];
     }
-    return {{"format", 1},
+    // Where there is one share, the order of its rows is that of format 1.
+    return {{"format", shares == 1 ? 1 : 2},
             {"ricochet", RICOCHET_VERSION},
             {"system", system_.name},
             {"columns", names_and_units(table_.columns)},

@@ -12,9 +12,6 @@
 
 namespace ricochet::app {
 
-/// Rows that are run and kept together.
-inline constexpr std::size_t block_rows = 64;
-
 /// One system under settings that the rows of a table vary.
 class EnsembleRuns {
 public:
@@ -23,13 +20,8 @@ public:
 
     [[nodiscard]] const SystemEntry& system() const noexcept { return system_; }
     [[nodiscard]] const Table& table() const noexcept { return table_; }
-    [[nodiscard]] std::size_t blocks() const noexcept
-    {
-        return (table_.rows + block_rows - 1) / block_rows;
-    }
-
-    /// Everything on which the results depend, and the fields that they have.
-    [[nodiscard]] Json setup() const;
+    /// Everything on which the results depend, the fields that they have, and the number of shares.
+    [[nodiscard]] Json setup(std::size_t shares) const;
 
     /// Runs a row and appends its fields. An exception becomes the outcome "failed", with its
     /// message. Several threads may call it.

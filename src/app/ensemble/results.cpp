@@ -135,21 +135,34 @@ std::string AllBlocks::rows(std::size_t block) const
 }
 
 void write_results(const std::filesystem::path& directory, const std::vector<Field>& fields,
-                   std::size_t rows, const AllBlocks& blocks)
+                   std::size_t rows, std::size_t shares, const AllBlocks& blocks)
 {
     NewFile npy_file(directory / "results.npy");
     NewFile csv_file(directory / "results.csv");
     std::string npy = numpy_header(fields, rows);
     std::string csv = csv_header(fields);
-    for (std::size_t block = 0; block < blocks.size(); ++block) {
-        const std::string bytes = blocks.rows(block);
-        for (RowReader reader(bytes); !reader.is_at_end();) put_row(fields, reader, npy, csv);
-        if (npy.size() + csv.size() < flushed && block + 1 < blocks.size()) continue;
+    const auto flush = [&](std::size_t enough) {
+        if (npy.size() + csv.size() < enough) return;
         npy_file.write(npy);
         csv_file.write(csv);
         npy.clear();
         csv.clear();
+    };
+    // The rows of one block of each share follow each other by turns.
+    std::vector<std::string> bytes;
+    std::vector<RowReader> readers;
+    for (std::size_t first = 0; first < blocks.size(); first += shares) {
+        const std::size_t count = std::min(shares, blocks.size() - first);
+        bytes.clear();
+        readers.clear();
+        for (std::size_t k = 0; k < count; ++k) bytes.push_back(blocks.rows(first + k));
+        for (const std::string& block : bytes) readers.emplace_back(block);
+        for (std::size_t k = 0; !readers[k].is_at_end(); k = (k + 1) % count) {
+            put_row(fields, readers[k], npy, csv);
+            flush(flushed);
+        }
     }
+    flush(1);
     npy_file.keep();
     csv_file.keep();
 }

@@ -33,10 +33,10 @@ private:
     std::vector<Place> places_;
 };
 
-/// Writes results.npy, one structure a row, and results.csv, in the order of the table. The same
-/// rows give the same bytes.
+/// Writes results.npy, one structure a row, and results.csv, in the order of the table, from the
+/// blocks of this number of shares. The same rows give the same bytes.
 /// @throws WriteError
 void write_results(const std::filesystem::path& directory, const std::vector<Field>& fields,
-                   std::size_t rows, const AllBlocks& blocks);
+                   std::size_t rows, std::size_t shares, const AllBlocks& blocks);
 
 }  // namespace ricochet::app

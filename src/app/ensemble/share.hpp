@@ -1,6 +1,7 @@
 // The part of an ensemble that a process runs.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <functional>
 #include <optional>
@@ -8,13 +9,43 @@
 
 namespace ricochet::app {
 
-/// Share number `index`, from 1, of `count`: block b of the table belongs to the share with
-/// b mod count = index - 1.
+/// Rows that are kept together.
+inline constexpr std::size_t block_rows = 64;
+
+/// Share number `index`, from 1, of `count`: row i of the table belongs to the share with
+/// i mod count = index - 1, so that expensive rows next to each other are divided among all.
 struct Share {
     std::size_t index = 1;
     std::size_t count = 1;
 
     friend bool operator==(const Share&, const Share&) = default;
+};
+
+/// The blocks of a table that is run by `shares`: block b has rows of share b mod shares + 1, which
+/// are `shares` apart.
+class Blocks {
+public:
+    Blocks(std::size_t rows, std::size_t shares) : rows_(rows), shares_(shares) {}
+
+    [[nodiscard]] std::size_t size() const noexcept
+    {
+        const std::size_t together = block_rows * shares_;
+        return rows_ / together * shares_ + std::min(rows_ % together, shares_);
+    }
+    /// Number of rows in a block.
+    [[nodiscard]] std::size_t rows_of(std::size_t block) const noexcept
+    {
+        const std::size_t first = row(block, 0);
+        return std::min(block_rows, (rows_ - first + shares_ - 1) / shares_);
+    }
+    /// Number in the table of row i of a block.
+    [[nodiscard]] std::size_t row(std::size_t block, std::size_t i) const noexcept
+    {
+        return (block / shares_ * block_rows + i) * shares_ + block % shares_;
+    }
+
+private:
+    std::size_t rows_, shares_;
 };
 
 /// "3/16"

@@ -34,6 +34,7 @@ void add_simulate_scene(CLI::App& app, int& status)
                      "times at which --csv, --plot and --animate have the bodies, default 501, and "
                      "--json if given");
     command.add_flag("--json", request->json, "print JSON");
+    command.add_flag("--no-events", request->no_events, "count events, and print none");
     add_text(command, "--csv", request->csv, "FILE", "write the bodies at each sample");
     add_text(command, "--plot", request->plot, "FILE", "draw the ways with gnuplot: .svg or .png");
     add_text(command, "--animate", request->animate, "FILE", "write the motion as one .svg");

@@ -87,11 +87,23 @@ int simulate_scene(const SceneRequest& request)
 
     const Interrupts interrupts;
     file.options.cancelled = Interrupts::flag();
+    if (request.no_events) file.options.record_events = false;
+    PrintedEvents events(file.scene);
+    const bool printed = request.json && file.options.record_events;
+    if (printed) {
+        // The picture shows them, too; else none is kept.
+        file.options.record_events = request.animate.has_value();
+        file.options.observe = [&](const SceneEvent& event) { events.add(event); };
+    }
     const SceneRun run = [&] {
         const RunWatch watch(request.json ? 1.0 / 20 : 1.0 / 6);
         return simulate(file.scene, file.options);
     }();
-    deliver({[&] { print(request.json ? scene_json(file, run, samples) : scene_text(file, run)); },
+    const auto report = [&] {
+        if (printed) events.end();
+        print(request.json ? scene_json(file, run, samples, printed) : scene_text(file, run));
+    };
+    deliver({report,
              [&] {
                  if (request.csv) write_file(*request.csv, scene_csv(file, run));
              },

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "../input.hpp"
 #include "../interrupt.hpp"
@@ -67,6 +68,10 @@ Json event_of(const Scene& scene, const SceneEvent& event)
     if (!has_other(event)) return out;
     out["other"] = other_of(scene, event);
     out["impulse"] = event.impulse;
+    if (event.kind == SceneEvent::Kind::impact) {
+        out["at"] = event.at;
+        out["normal"] = event.normal;
+    }
     out["before"] = event.before[0];
     out["after"] = event.after[0];
     if (!event.other.is_surface) {
@@ -109,7 +114,30 @@ std::string scene_text(const SceneFile& file, const SceneRun& run)
     return fmt::to_string(out);
 }
 
-std::string scene_json(const SceneFile& file, const SceneRun& run, bool samples)
+void PrintedEvents::begin()
+{
+    if (!std::exchange(begun_, true)) text_ += "{\n  \"events\": [";
+}
+
+void PrintedEvents::add(const SceneEvent& event)
+{
+    constexpr std::size_t together = 1 << 18;  // bytes
+    begin();
+    text_ += std::exchange(any_, true) ? ",\n    " : "\n    ";
+    text_ += event_of(scene_, event).dump(-1, ' ', false, Json::error_handler_t::replace);
+    if (text_.size() < together) return;
+    print(text_);
+    text_.clear();
+}
+
+void PrintedEvents::end()
+{
+    begin();
+    text_ += any_ ? "\n  ],\n" : "],\n";
+    print(std::exchange(text_, {}));
+}
+
+std::string scene_json(const SceneFile& file, const SceneRun& run, bool samples, bool begun)
 {
     const Scene& scene = file.scene;
     Json out{{"outcome", ricochet::name(run.outcome)}, {"message", run.message}, {"t", run.t}};
@@ -118,8 +146,6 @@ std::string scene_json(const SceneFile& file, const SceneRun& run, bool samples)
     for (const std::uint32_t i : run.involved) out["involved"].push_back(scene.name_of(BodyId{i}));
     out["energy"] = energy(scene, run.bodies);
     out["bodies"] = states_of(scene, run.bodies);
-    out["events"] = Json::array();
-    for (const SceneEvent& event : run.events) out["events"].push_back(event_of(scene, event));
     if (samples) {
         out["samples"] = Json::array();
         for (std::size_t k = 0; k < run.samples.size(); ++k) {
@@ -139,7 +165,8 @@ std::string scene_json(const SceneFile& file, const SceneRun& run, bool samples)
                          {"joins", s.joins},
                          {"alone", s.alone},
                          {"groups", s.groups}};
-    return json_text(out);
+    // Without the brace that `PrintedEvents` has printed.
+    return begun ? json_text(out).substr(2) : json_text(out);
 }
 
 std::string scene_csv(const SceneFile& file, const SceneRun& run)

@@ -10,6 +10,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <ctime>
+#include <map>
 #include <mutex>
 #include <set>
 #include <stdexcept>
@@ -98,6 +99,41 @@ TEST(Ensemble, RowsRunAtTheSameTime)
                               {.threads = 2});
     for (const auto& row : all.rows) EXPECT_TRUE(row.value());
     EXPECT_EQ(seen.size(), 2u);
+}
+
+TEST(Ensemble, ExpensiveRowsNextToEachOtherAreDividedAmongThreads)
+{
+    // Forty rows that wait 2 ms each, in chunks that one thread would otherwise run. Each thread
+    // begins when the other is there. One may hold a row more than its half for as long as a row
+    // takes, and on a busy machine be late by a few.
+    for (const std::size_t place : {0U, 30U, 1000U, 1960U}) {
+        std::atomic<unsigned> begun = 0;
+        std::mutex guard;
+        std::map<std::thread::id, int> waited;
+        const auto run = [&](const EnsembleRow& row) {
+            const bool slow = row.index >= place && row.index < place + 40;
+            bool first = false;
+            {
+                const std::lock_guard lock(guard);
+                first = waited.try_emplace(std::this_thread::get_id(), 0).second;
+                if (slow) ++waited[std::this_thread::get_id()];
+            }
+            if (first) {
+                ++begun;
+                const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+                while (begun < 2 && std::chrono::steady_clock::now() < until) {
+                    std::this_thread::yield();
+                }
+            }
+            if (slow) std::this_thread::sleep_for(std::chrono::milliseconds(2));
+            return row.index;
+        };
+        const auto all = ensemble(2000, run, {.threads = 2});
+        EXPECT_TRUE(all.complete);
+        ASSERT_EQ(waited.size(), 2U);
+        for (const auto& [thread, count] : waited) EXPECT_GE(count, 14) << "rows from " << place;
+        for (std::size_t i = 0; i < 2000; ++i) EXPECT_EQ(all.rows[i].value(), i);
+    }
 }
 
 TEST(Ensemble, TwoThreadsTakeLittleMoreProcessorTimeThanOne)
