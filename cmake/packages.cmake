@@ -32,7 +32,7 @@ function(ricochet_package group package depends summary)
 endfunction()
 
 set(ricochet_dev core)
-foreach(component IN ITEMS taylor nonsmooth sensitivity scene scene_contact faults learn learn_steps)
+foreach(component IN ITEMS taylor nonsmooth sensitivity scene scene_contact faults fmi learn learn_steps)
     if(TARGET ricochet_${component})
         list(APPEND ricochet_dev ${component})
     endif()
