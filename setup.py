@@ -39,9 +39,10 @@ class CMakeBuild(build_ext):
         target = Path(self.get_ext_fullpath(extension.name)).resolve()
         target.parent.mkdir(parents=True, exist_ok=True)
         self.copy_file(str(module), str(target))
-        # Training, where CMAKE_ARGS asks for it.
-        for learn in (build / "python" / "ricochet").glob("_learn.*"):
-            self.copy_file(str(learn), str(target.parent / learn.name))
+        # Training, where CMAKE_ARGS asks for it; FMUs, where what they need is there.
+        for part in ("_learn", "_fmi"):
+            for module in (build / "python" / "ricochet").glob(f"{part}.*"):
+                self.copy_file(str(module), str(target.parent / module.name))
 
 
 setup(

@@ -10,6 +10,7 @@ floating-point numbers.
 from . import _show  # noqa: F401
 from ._compiled import (C_FLOW, C_GUARD, C_RATE, C_RESET, Compiled)
 from ._ensemble import Ensemble, ensemble, row_seed
+from ._fmu import Fmu, FmuRun, load_fmu
 from ._inclusion import Inclusion
 from ._ivp import solve_ivp
 from ._monitor import Cut, Monitor, Verdict
@@ -25,8 +26,8 @@ from ._training import Certified, Trained, certify, train_classifier, train_gate
 
 __all__ = [
     "BouncingBall", "C_FLOW", "C_GUARD", "C_RATE", "C_RESET", "Certified", "Compiled",
-    "CoulombOscillator", "Cut", "Ensemble", "Guard", "ImpactOscillator", "Inclusion", "Kind", "Monitor", "Network", "OdeResult",
+    "CoulombOscillator", "Cut", "Ensemble", "Fmu", "FmuRun", "Guard", "ImpactOscillator", "Inclusion", "Kind", "Monitor", "Network", "OdeResult",
     "Pendulum", "Run", "Simulation", "Snapshot", "Solution", "StickSlip", "Stop", "System", "Thermostat",
-    "Times", "Trained", "Verdict", "certify", "ensemble", "every", "guard", "integrate", "plot",
+    "Times", "Trained", "Verdict", "certify", "ensemble", "every", "guard", "integrate", "load_fmu", "plot",
     "row_seed", "solve_ivp", "train_classifier", "train_gate",
 ]
