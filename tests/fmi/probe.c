@@ -50,8 +50,7 @@ static int bad(M* m, int line)
 }
 #define BAD(m) bad(m, __LINE__)
 
-/* ---- models: start, flow, indicators, one round of event iteration ----------------------------
- */
+/* ---- models: start, flow, indicators, one round of event iteration ---- */
 
 static void start_drop(M* m)
 {
@@ -393,8 +392,7 @@ static bool is(const M* m, const char* name)
     return strcmp(m->model->name, name) == 0;
 }
 
-/* ---- what both versions do ---------------------------------------------------------------------
- */
+/* ---- what both versions do ---- */
 
 static M* instantiate(const char* token)
 {
@@ -538,8 +536,7 @@ static int get(M* m, unsigned r, double* value)
     return OK;
 }
 
-/* ---- FMI 2.0 ------------------------------------------------------------------------------------
- */
+/* ---- FMI 2.0 ---- */
 
 typedef struct {
     int again, end, nominals, values, defined;
@@ -662,14 +659,13 @@ EXPORT int fmi2GetDirectionalDerivative(M* m, const unsigned* u, size_t nu, cons
     {                     \
         return ERROR;     \
     }
-NOT(fmi2GetBoolean)
-NOT(fmi2SetInteger)
-NOT(fmi2SetBoolean)
+NOT(fmi2GetBoolean);
+NOT(fmi2SetInteger);
+NOT(fmi2SetBoolean);
 
-    /* ---- FMI 3.0: the state is one array
-       ------------------------------------------------------------ */
+/* ---- FMI 3.0: the state is one array ---- */
 
-    EXPORT const char* fmi3GetVersion(void)
+EXPORT const char* fmi3GetVersion(void)
 {
     return "3.0";
 }
@@ -787,9 +783,22 @@ EXPORT int fmi3GetDirectionalDerivative(M* m, const uint32_t* u, size_t nu, cons
         return BAD(m), ERROR;
     return directional(m, ncolumn, nseed > 1 && seed[1] != 0, seed, column);
 }
-NOT(fmi3GetFloat32)
-NOT(fmi3SetFloat32)
-NOT(fmi3GetInt8) NOT(fmi3SetInt8) NOT(fmi3GetUInt8) NOT(fmi3SetUInt8) NOT(fmi3GetInt16)
-    NOT(fmi3SetInt16) NOT(fmi3GetUInt16) NOT(fmi3SetUInt16) NOT(fmi3SetInt32) NOT(fmi3GetUInt32)
-        NOT(fmi3SetUInt32) NOT(fmi3GetInt64) NOT(fmi3SetInt64) NOT(fmi3GetUInt64) NOT(fmi3SetUInt64)
-            NOT(fmi3GetBoolean) NOT(fmi3SetBoolean)
+NOT(fmi3GetFloat32);
+NOT(fmi3SetFloat32);
+NOT(fmi3GetInt8);
+NOT(fmi3SetInt8);
+NOT(fmi3GetUInt8);
+NOT(fmi3SetUInt8);
+NOT(fmi3GetInt16);
+NOT(fmi3SetInt16);
+NOT(fmi3GetUInt16);
+NOT(fmi3SetUInt16);
+NOT(fmi3SetInt32);
+NOT(fmi3GetUInt32);
+NOT(fmi3SetUInt32);
+NOT(fmi3GetInt64);
+NOT(fmi3SetInt64);
+NOT(fmi3GetUInt64);
+NOT(fmi3SetUInt64);
+NOT(fmi3GetBoolean);
+NOT(fmi3SetBoolean);
