@@ -17,7 +17,7 @@ using Values = std::vector<double>;
 
 bool same_bits(const Values& a, const Values& b)
 {
-    return std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
+    return a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
 }
 
 /// The first moments of an instance, looked at more closely than a run does.

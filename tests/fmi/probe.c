@@ -584,6 +584,7 @@ EXPORT int fmi2NewDiscreteStates(M* m, Info2* out)
     Info info;
     const int status = update(m, &info);
     *out = (Info2){info.again, info.end, info.nominals, info.values, isfinite(m->next), m->next};
+    if (status == FATAL) free(m); /* nothing may be called after this, FreeInstance neither */
     return status;
 }
 EXPORT int fmi2EnterContinuousTimeMode(M* m)
@@ -699,6 +700,7 @@ EXPORT int fmi3UpdateDiscreteStates(M* m, bool* again, bool* end, bool* nominals
     const int status = update(m, &info);
     *again = info.again, *end = info.end, *nominals = info.nominals, *values = info.values;
     *defined = isfinite(m->next), *next = m->next;
+    if (status == FATAL) free(m);
     return status;
 }
 EXPORT int fmi3EnterContinuousTimeMode(M* m)
