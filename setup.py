@@ -39,9 +39,9 @@ class CMakeBuild(build_ext):
         target = Path(self.get_ext_fullpath(extension.name)).resolve()
         target.parent.mkdir(parents=True, exist_ok=True)
         self.copy_file(str(module), str(target))
-        # Scenes, and training where CMAKE_ARGS asks for it.
-        for name in ("_scenes", "_learn"):
-            for further in (build / "python" / "ricochet").glob(f"{name}.*"):
+        # Scenes; training where CMAKE_ARGS asks for it; FMUs where what they need is there.
+        for part in ("_scenes", "_learn", "_fmi"):
+            for further in (build / "python" / "ricochet").glob(f"{part}.*"):
                 self.copy_file(str(further), str(target.parent / further.name))
 
 

@@ -32,12 +32,16 @@ function(ricochet_package group package depends summary)
 endfunction()
 
 set(ricochet_dev core)
-foreach(component IN ITEMS taylor nonsmooth sensitivity scene scene_contact faults learn learn_steps)
+foreach(component IN ITEMS taylor nonsmooth sensitivity scene scene_contact faults fmi learn learn_steps)
     if(TARGET ricochet_${component})
         list(APPEND ricochet_dev ${component})
     endif()
 endforeach()
-ricochet_package(dev libricochet-dev "libeigen3-dev, libboost-dev, libboost-math-dev, libfmt-dev"
+set(ricochet_dev_depends "libeigen3-dev, libboost-dev, libboost-math-dev, libfmt-dev")
+if(TARGET ricochet_fmi)
+    string(APPEND ricochet_dev_depends ", libpugixml-dev, libminizip-dev")
+endif()
+ricochet_package(dev libricochet-dev "${ricochet_dev_depends}"
     "Hybrid systems: static libraries and headers for C++" ${ricochet_dev} hosts)
 if(RICOCHET_C)
     # Both have the file by which CMake finds what is installed.

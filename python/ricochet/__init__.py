@@ -11,6 +11,7 @@ from . import _show  # noqa: F401
 from ._compiled import C_FLOW, C_GUARD, C_JACOBIAN, C_RATE, C_RESET, Compiled
 from ._ensemble import Ensemble, ensemble, row_seed
 from ._filippov import Filippov
+from ._fmu import Fmu, FmuRun, load_fmu
 from ._inclusion import Inclusion
 from ._ivp import solve_ivp
 from ._monitor import Cut, Monitor, Verdict
@@ -27,8 +28,9 @@ from ._training import Certified, Trained, certify, train_classifier, train_gate
 
 __all__ = [
     "BouncingBall", "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified", "Compiled",
-    "CoulombOscillator", "Cut", "Ensemble", "Filippov", "Guard", "ImpactOscillator", "Inclusion", "Kind", "Monitor", "Network", "OdeResult",
-    "Pendulum", "Run", "Scene", "SceneKind", "SceneRun", "Simulation", "Snapshot", "Solution", "StickSlip", "Stop", "System", "Thermostat",
-    "Times", "Trained", "Verdict", "certify", "ensemble", "every", "guard", "integrate", "plot",
-    "row_seed", "solve_ivp", "train_classifier", "train_gate",
+    "CoulombOscillator", "Cut", "Ensemble", "Filippov", "Fmu", "FmuRun", "Guard", "ImpactOscillator", "Inclusion",
+    "Kind", "Monitor", "Network", "OdeResult", "Pendulum", "Run", "Scene", "SceneKind", "SceneRun", "Simulation",
+    "Snapshot", "Solution", "StickSlip", "Stop", "System", "Thermostat", "Times", "Trained", "Verdict", "certify",
+    "ensemble", "every", "guard", "integrate", "load_fmu", "plot", "row_seed", "solve_ivp", "train_classifier",
+    "train_gate",
 ]

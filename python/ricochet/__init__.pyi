@@ -1,7 +1,7 @@
 from enum import IntEnum
 from os import PathLike
 from types import SimpleNamespace
-from typing import (Any, Callable, Iterable, Iterator, Mapping, NamedTuple, Optional, Sequence,
+from typing import (Any, Callable, Iterable, Iterator, Mapping, MutableMapping, NamedTuple, Optional, Sequence,
                     Tuple, Union, overload)
 
 import numpy as np
@@ -525,3 +525,37 @@ def plot(run: Any, components: Optional[Sequence[int]] = None, *,
          labels: Optional[Sequence[str]] = None, phase: Optional[Tuple[int, int]] = None,
          events: bool = True, modes: bool = True, unit: Optional[str] = None,
          ax: Any = None) -> Any: ...
+
+class FmuRun:
+    outcome: str
+    message: str
+    success: bool
+    t: _Floats
+    sides: NDArray[np.int8]
+    events: list[SimpleNamespace]
+    t_end: float
+    x: _Floats
+    method: str
+    statistics: SimpleNamespace
+    warnings: list[str]
+    def __getitem__(self, name: str) -> _Floats: ...
+    def keys(self) -> Iterable[str]: ...
+
+class Fmu:
+    file: str
+    name: str
+    version: str
+    states: list[str]
+    variables: dict[str, SimpleNamespace]
+    parameters: MutableMapping[str, float]
+    def __init__(self, file: Union[str, PathLike[str]]) -> None: ...
+    def simulate(self, t_end: Optional[float] = None, t_start: Optional[float] = None, *,
+                 rtol: float = 1e-8, method: str = "automatic", h_max: float = ...,
+                 start: Optional[Mapping[str, float]] = None,
+                 inputs: Optional[Mapping[str, Any]] = None,
+                 output: Optional[Iterable[str]] = None,
+                 sample_times: Optional[ArrayLike] = None, samples: int = 501,
+                 step: Optional[float] = None,
+                 co_simulation: Optional[bool] = None) -> FmuRun: ...
+
+def load_fmu(file: Union[str, PathLike[str]]) -> Fmu: ...

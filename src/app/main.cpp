@@ -23,6 +23,7 @@ namespace {
 
 constexpr std::string_view nonsmooth = "nonsmooth";
 constexpr std::string_view scene = "scene";
+constexpr std::string_view fmi = "fmi";
 
 char** all_arguments = nullptr;  ///< of main, for the programs that replace it
 
@@ -35,8 +36,8 @@ int run_instead(std::string_view name, char** arguments)
     std::string file = (here.parent_path() / program).string();
     arguments[-1] = file.data();
     execv(file.c_str(), arguments - 1);
-    // ricochet_nonsmooth and ricochet_scene are libraries.
-    const std::string_view kind = name == nonsmooth || name == scene ? "_app" : "";
+    // ricochet_nonsmooth, ricochet_scene and ricochet_fmi are libraries.
+    const std::string_view kind = name == nonsmooth || name == scene || name == fmi ? "_app" : "";
     throw std::runtime_error(
         fmt::format("'{}' cannot be run: {}; it is built by the target ricochet_{}{}", file,
                     std::strerror(errno), name, kind));
@@ -79,21 +80,23 @@ void add_commands(CLI::App& app, int& status)
     add_program(app, programs[2].name, programs[2].meaning);
     add_compare(app, status, compare_here_or_there);
     add_program(app, "explain", "Say how a scene would be run: ricochet explain SCENE.json");
+    add_program(app, "fmu", "Say what an FMU is: ricochet fmu MODEL.fmu");
 }
 
-/// Whether the command is about a scene in a file: `simulate SCENE.json` and `explain`.
-bool is_of_scene(int count, char** arguments)
+/// Whether the command is about a file with that ending: `simulate FILE`, or the command `other`.
+bool is_of_file(int count, char** arguments, std::string_view ending, std::string_view other)
 {
     if (count < 2) return false;
     const std::string_view command = arguments[1];
-    if (command == "explain") return true;
+    if (command == other) return true;
     if (command != "simulate") return false;
     // The file may come after options, and the value of an option may be a file, too.
     for (int k = 2; k < count; ++k) {
         const std::string_view before = arguments[k - 1];
         const std::string_view argument = arguments[k];
-        const bool value = before.starts_with("--") && before != "--json";
-        if (!value && !argument.starts_with('-') && argument.ends_with(".json")) return true;
+        const bool value =
+            before.starts_with("--") && before != "--json" && before != "--co-simulation";
+        if (!value && !argument.starts_with('-') && argument.ends_with(ending)) return true;
     }
     return false;
 }
@@ -101,8 +104,10 @@ bool is_of_scene(int count, char** arguments)
 int run(int count, char** arguments)
 {
     all_arguments = arguments;
-    if (is_of_scene(count, arguments)) {
-        return run_program([&](CLI::App&, int&) { run_instead(scene, arguments + 1); }, count,
+    for (const auto& [program, ending, other] :
+         {std::array<std::string_view, 3>{scene, ".json", "explain"}, {fmi, ".fmu", "fmu"}}) {
+        if (!is_of_file(count, arguments, ending, other)) continue;
+        return run_program([&](CLI::App&, int&) { run_instead(program, arguments + 1); }, count,
                            arguments);
     }
     for (const Program& program : programs) {

@@ -209,7 +209,7 @@ void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
     CLI::App& command = *app.add_subcommand("simulate", "Run a system and print its events");
     auto request = std::make_shared<SimulateRequest>();
     add_system(command, request->system,
-               "a system's name, see `ricochet systems`, or a scene file (.json)");
+               "a system's name, see `ricochet systems`, a scene file (.json) or an FMU (.fmu)");
     add_run_options(command, request->run);
     add_whole_number(
         command, "--samples", request->samples, 2, 10'000'000,

@@ -39,6 +39,9 @@ def main(program, long):
     with tempfile.TemporaryDirectory() as work:
         for name in ("models", "examples"):
             os.symlink(ROOT / name, Path(work) / name)
+        ball = Path(program).resolve().parents[1] / "tests/fmi/fmus/fmu_ball.fmu"
+        if ball.exists():
+            os.symlink(ball, Path(work) / "ball.fmu")
         for page, command in commands():
             command = re.sub(r"^build/release/bin/(?=ricochet\b)", "", command)
             if command.startswith("printf "):  # makes a file for the next command
@@ -50,6 +53,8 @@ def main(program, long):
                 continue
             words = shlex.split(command)
             tool = Path(program).resolve().with_name(words[0])
+            if ".fmu" in command and not ball.exists():
+                continue
             if any(re.search(pattern, command) for pattern in LONG) and not long:
                 words = [words[0], *words[1:2], "--help"] if words[0] == "ricochet" else None
             if words is None or not tool.exists():

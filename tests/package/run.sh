@@ -39,9 +39,11 @@ for compiler in "$@"; do
 done
 last=${!#}
 build_type=None
+components=(taylor nonsmooth sensitivity scene faults learn learn_steps)
+if [ -e "$work/whole/include/ricochet/fmi" ]; then components+=(fmi); fi
+list=$(IFS=';'; echo "${components[*]}")
 consume "$last" "all components" -DCMAKE_PREFIX_PATH="$work/whole" \
-    -DRICOCHET_COMPONENTS="taylor;nonsmooth;sensitivity;scene;faults;learn;learn_steps;hosts" \
-    -- taylor nonsmooth sensitivity scene faults learn learn_steps
+    -DRICOCHET_COMPONENTS="$list;hosts" -- "${components[@]}"
 consume "$last" "add_subdirectory" -DRICOCHET_SOURCE="$source" -- consumer
 
 if cmake -G Ninja -S "$source/tests/package" -B "$work/missing" -DCMAKE_PREFIX_PATH="$work/core" \

@@ -1,0 +1,304 @@
+// Systems as FMUs, run by the import: the events of the system itself.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "ricochet/fmi/run.hpp"
+#include "ricochet/integrate.hpp"
+#include "ricochet/systems/bouncing_ball.hpp"
+#include "ricochet/systems/coulomb_oscillator.hpp"
+#include "ricochet/systems/impact_oscillator.hpp"
+#include "ricochet/systems/stick_slip.hpp"
+#include "ricochet/systems/thermostat.hpp"
+
+namespace ricochet::fmi::export_test {
+
+namespace {
+
+using Result = fmi::Run;  // a test has a function Run
+
+Fmu exported(const std::string& name, int version)
+{
+    const std::string ending = version == 2 ? "-2.fmu" : ".fmu";
+    return Fmu(std::filesystem::path(RICOCHET_FMUS) / ("fmu_" + name + ending));
+}
+
+class Exports : public testing::TestWithParam<int> {};
+INSTANTIATE_TEST_SUITE_P(Fmi, Exports, testing::Values(2, 3));
+
+std::vector<double> times(const Result& run)
+{
+    std::vector<double> out;
+    for (const Event& event : run.events) {
+        if (event.causes.state || event.causes.time || event.causes.step) out.push_back(event.t);
+    }
+    return out;
+}
+
+void expect_times(const std::vector<double>& found, const std::vector<double>& expected,
+                  double tolerance)
+{
+    ASSERT_EQ(found.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+        EXPECT_NEAR(found[i], expected[i], tolerance) << i;
+    }
+}
+
+TEST_P(Exports, TheBallAsModelExchangeHasItsImpacts)
+{
+    for (const double rtol : {1e-4, 1e-10}) {
+        const Result run = fmi::run(exported("ball", GetParam()), {.t_end = 12,
+                                                                   .rtol = rtol,
+                                                                   .method = Method::fehlberg78,
+                                                                   .output = {"events"},
+                                                                   .sample_times = {12}});
+        ASSERT_EQ(run.end, End::reached_end) << describe(run);
+        std::vector<double> expected;
+        const BouncingBall ball({.gravity = 9.81, .restitution = 0.9});
+        for (int n = 0; ball.impact_time(n, 10) < 12; ++n)
+            expected.push_back(ball.impact_time(n, 10));
+        // A quadratic motion: what is left is the location, to a double of 1.8e-15 s at t = 12.
+        expect_times(times(run), expected, 4e-15);
+        EXPECT_EQ(run.last("events"), static_cast<double>(expected.size()));
+    }
+}
+
+TEST_P(Exports, TheBallComesToRestInBothInterfaces)
+{
+    // Its impacts with restitution 0.5 accumulate at 3 times the first fall.
+    const double limit = 3 * std::sqrt(2 * 10 / 9.81);
+    for (const bool co : {false, true}) {
+        const Result run = fmi::run(exported("ball", GetParam()), {.t_end = 6,
+                                                                   .start = {{"restitution", 0.5}},
+                                                                   .output = {"height", "velocity"},
+                                                                   .sample_times = {5.0, 6.0},
+                                                                   .co_simulation = co});
+        ASSERT_EQ(run.end, End::reached_end) << describe(run);
+        EXPECT_GT(limit, 4);
+        EXPECT_EQ(run.last("height"), 0) << co;
+        EXPECT_EQ(run.last("velocity"), 0) << co;
+    }
+}
+
+TEST_P(Exports, CoSimulationOfTheBallDoesNotDependOnTheSteps)
+{
+    const BouncingBall ball({.gravity = 9.81, .restitution = 0.9});
+    // Between impacts n and n + 1: the height from the speed after n impacts.
+    int n = 0;
+    while (ball.impact_time(n + 1, 10) < 12) ++n;
+    const double speed = std::sqrt(2 * 9.81 * 10) * std::pow(0.9, n + 1);
+    const double after = 12 - ball.impact_time(n, 10);
+    const double expected = speed * after - 9.81 / 2 * after * after;
+    for (const double step : {0.01, 0.1, 1.0 / 3, 12.0}) {
+        const Result run = fmi::run(exported("ball", GetParam()), {.t_end = 12,
+                                                                   .output = {"height", "events"},
+                                                                   .sample_times = {12},
+                                                                   .step = step,
+                                                                   .co_simulation = true});
+        ASSERT_EQ(run.end, End::reached_end) << describe(run);
+        // The last impact is known to four doubles of a time of 12 s, 1.8e-15 s each, and the ball
+        // leaves it at 8.3 m/s.
+        EXPECT_NEAR(run.last("height"), expected, 4 * 1.8e-15 * 8.3) << step;
+        EXPECT_EQ(run.last("events"), n + 1);
+    }
+}
+
+TEST(ExportsOfVersion3, CoSimulationShowsTheStateBeforeTheEventUntilItIsHandled)
+{
+    const Result run =
+        fmi::run(exported("ball", 3),
+                 {.t_end = 12, .output = {"velocity"}, .step = 0.5, .co_simulation = true});
+    const BouncingBall ball({.gravity = 9.81, .restitution = 0.9});
+    ASSERT_GE(run.events.size(), 3U);
+    for (std::size_t i = 0; i < run.events.size(); ++i) {
+        EXPECT_NEAR(run.events[i].t, ball.impact_time(static_cast<int>(i), 10), 1e-14);
+    }
+    for (std::size_t i = 0; i + 1 < run.rows.size(); ++i) {
+        if (run.rows[i].place != Row::Place::before_event) continue;
+        EXPECT_LT(run.rows[i].values[0], 0);
+        EXPECT_NEAR(run.rows[i + 1].values[0], -0.9 * run.rows[i].values[0], 1e-14);
+    }
+}
+
+TEST_P(Exports, TheThermostatSwitchesWhereItDoesInARunOfItsOwn)
+{
+    const Thermostat room;
+    const Result run =
+        fmi::run(exported("thermostat", GetParam()), {.t_end = 10,
+                                                      .rtol = 1e-12,
+                                                      .method = Method::fehlberg78,
+                                                      .output = {"mode", "temperature"},
+                                                      .sample_times = {10}});
+    ASSERT_EQ(run.end, End::reached_end) << describe(run);
+    std::vector<double> expected;
+    for (int n = 0; room.switch_time(n) < 10; ++n) expected.push_back(room.switch_time(n));
+    ASSERT_GE(expected.size(), 3U);
+    expect_times(times(run), expected, 1e-10);  // 1e-12 of 22 degrees, at 0.8 degrees a second
+    EXPECT_EQ(run.last("mode"), expected.size() % 2 == 1 ? Thermostat::on : Thermostat::off);
+}
+
+TEST_P(Exports, TheImpactOscillatorHasTheImpactsOfTheClosedForm)
+{
+    const std::vector<double> expected = ImpactOscillator().impacts(40);
+    ASSERT_GE(expected.size(), 3U);
+    const Result run = fmi::run(exported("oscillator", GetParam()), {.t_end = 40,
+                                                                     .rtol = 1e-13,
+                                                                     .method = Method::fehlberg78,
+                                                                     .output = {"energy", "x", "v"},
+                                                                     .sample_times = {40}});
+    ASSERT_EQ(run.end, End::reached_end) << describe(run);
+    expect_times(times(run), expected, 1e-9);
+    EXPECT_NEAR(run.last("energy"), (std::pow(run.last("x"), 2) + std::pow(run.last("v"), 2)) / 2,
+                1e-15);
+}
+
+TEST_P(Exports, TimeEventsAndInputsOfASampledController)
+{
+    // x' = -x + u + held: from x_k to held + u + (x_k - held - u) e^-h at the next tick.
+    const auto closed = [](double t_end, const std::function<double(double)>& u) {
+        double x = 1, held = -1;  // the tick at 0
+        for (double t = 0; t < t_end - 1e-9; t += 0.5) {
+            if (t > 0) held = -x;
+            const double limit = held + u(t);
+            x = limit + (x - limit) * std::exp(-0.5);
+        }
+        return x;
+    };
+    for (const bool co : {false, true}) {
+        Options options{.t_end = 3.75 + 0.25,
+                        .rtol = 1e-12,
+                        .output = {"x"},
+                        .sample_times = {4},
+                        .step = 0.25,
+                        .co_simulation = co};
+        const Result constant = fmi::run(exported("sampled", GetParam()), options);
+        ASSERT_EQ(constant.end, End::reached_end) << describe(constant);
+        EXPECT_NEAR(constant.last("x"), closed(4, [](double) { return 0.5; }), 1e-9) << co;
+        options.inputs = {{.name = "u", .t = {0, 2, 2}, .values = {0.5, 0.5, -1}}};
+        const Result jump = fmi::run(exported("sampled", GetParam()), options);
+        EXPECT_NEAR(jump.last("x"), closed(4, [](double t) { return t < 2 ? 0.5 : -1; }), 1e-9)
+            << co;
+    }
+}
+
+TEST_P(Exports, SimultaneousEventsAndCascadesGiveTheSameCountAsARunOfTheLibrary)
+{
+    // Both impacts at t = 1 raise the count to 2, which carries the third guard across: 12. The
+    // next impacts, at 2, are at the end.
+    for (const bool co : {false, true}) {
+        const Result run = fmi::run(exported("cascade", GetParam()), {.t_end = 1.9,
+                                                                      .output = {"count", "events"},
+                                                                      .sample_times = {1.9},
+                                                                      .co_simulation = co});
+        ASSERT_EQ(run.end, End::reached_end) << describe(run);
+        EXPECT_EQ(run.last("count"), 12) << co;
+        EXPECT_EQ(run.last("events"), 3) << co;
+    }
+}
+
+/// Times of the events of a run of the library that change the state or the mode.
+template <class System>
+std::vector<double> native(const System& system, const typename System::State& x0, double t_end,
+                           Mode mode = 0)
+{
+    std::vector<double> out;
+    const auto run =
+        integrate(system, x0, {.t_end = t_end, .mode = mode, .rtol = 1e-10, .atol = 1e-10});
+    for (const auto& event : run.events) {
+        const bool acts = event.mode_before != event.mode_after || event.before != event.after;
+        if (acts && (out.empty() || out.back() != event.t)) out.push_back(event.t);
+    }
+    return out;
+}
+
+TEST(ExportsOfVersion3, FiveReadySystemsHaveTheirEventsAfterARoundTrip)
+{
+    const auto there = [](const std::string& name, double t_end) {
+        return times(
+            fmi::run(exported(name, 3), {.t_end = t_end, .step = t_end, .co_simulation = true}));
+    };
+    // One run of the library inside, with the options above.
+    expect_times(there("ball", 12),
+                 native(BouncingBall({.gravity = 9.81, .restitution = 0.9}), {10, 0}, 12), 1e-14);
+    expect_times(there("thermostat", 30), native(Thermostat(), {20}, 30), 1e-14);
+    expect_times(there("oscillator", 40), native(ImpactOscillator(), {0, 0}, 40), 1e-14);
+    expect_times(
+        there("coulomb", 20),
+        native(CoulombOscillator(), CoulombOscillator::start, 20, CoulombOscillator::start_mode),
+        1e-14);
+    expect_times(there("stick_slip", 30),
+                 native(StickSlip(), StickSlip::start, 30, StickSlip::start_mode), 1e-14);
+}
+
+TEST_P(Exports, FrictionAsModelExchangeSticksAndSlipsInTime)
+{
+    // The closed form of the cycle; dopri5 at 1e-12, whose error of the speed is divided by its
+    // rate.
+    const Result run = fmi::run(exported("stick_slip", GetParam()), {.t_end = 30,
+                                                                     .rtol = 1e-12,
+                                                                     .method = Method::fehlberg78,
+                                                                     .output = {"mode"},
+                                                                     .sample_times = {30}});
+    ASSERT_EQ(run.end, End::reached_end) << describe(run);
+    const std::vector<double> found = times(run);
+    ASSERT_GE(found.size(), 4U);
+    EXPECT_NEAR(found[0], StickSlip::stick_time, 1e-9);
+    EXPECT_NEAR(found[1], StickSlip::period, 1e-9);
+    EXPECT_NEAR(found[2], StickSlip::period + StickSlip::stick_time, 1e-9);
+}
+
+TEST_P(Exports, ASetValuedSystemIsForCoSimulation)
+{
+    const Fmu held = exported("held_ball", GetParam());
+    EXPECT_FALSE(held.description().model_exchange);
+    for (const double step : {0.01, 2.0}) {
+        const Result run =
+            fmi::run(held, {.output = {"height", "mode"}, .sample_times = {1.25, 2}, .step = step});
+        ASSERT_EQ(run.end, End::reached_end) << describe(run);
+        // It lies on the floor at 1.25 s; lifted with 20 (t - 1.5) from 1.5 s on, it is at
+        // 20 * 0.5^3 / 6 at 2 s.
+        EXPECT_NEAR(run.last("height"), 20 * 0.125 / 6, 1e-7);
+        for (const Row& row : run.rows) {
+            if (row.t == 1.25) {
+                EXPECT_EQ(row.values[0], 0);
+            }
+        }
+    }
+}
+
+TEST_P(Exports, ParametersAreTunedDuringARun)
+{
+    Simulation simulation(exported("ball", GetParam()), {.t_end = 12});
+    ASSERT_TRUE(simulation.advance());  // the first impact
+    const double t = simulation.t(), speed = simulation.x()[1];
+    simulation.set("gravity", 2 * 9.81);
+    ASSERT_TRUE(simulation.advance());
+    EXPECT_NEAR(simulation.t(), t + speed / 9.81, 1e-14);
+    EXPECT_THROW(simulation.set("height", 1), Error);
+}
+
+TEST(ExportedDescription, SaysNamesUnitsAndStarts)
+{
+    for (const int version : {2, 3}) {
+        const Description d = exported("ball", version).description();
+        EXPECT_EQ(d.model_name, "Ball & \"floor\"");
+        EXPECT_EQ(d.state_names(), (std::vector<std::string>{"height", "velocity"}));
+        EXPECT_EQ(d.indicator_count, 1U);
+        EXPECT_EQ(d.t_end, 12);
+        const Variable& height = d.variables[d.find("height")->variable];
+        EXPECT_EQ(height.unit, "m");
+        EXPECT_EQ(height.start, std::vector<double>{10});
+        EXPECT_EQ(height.description, "above the floor");
+        EXPECT_TRUE(d.model_exchange->saves_state && d.co_simulation->variable_steps);
+    }
+    EXPECT_NE(exported("ball", 3).description().token,
+              exported("thermostat", 3).description().token);
+}
+
+}  // namespace
+
+}  // namespace ricochet::fmi::export_test

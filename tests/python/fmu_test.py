@@ -1,0 +1,73 @@
+"""FMUs in Python: those that the tests in C++ have built."""
+
+import math
+import os
+
+import numpy as np
+import pytest
+
+import ricochet
+
+FMUS = os.environ.get("RICOCHET_FMUS", "")
+pytestmark = pytest.mark.skipif(not os.path.exists(f"{FMUS}/fmu_ball.fmu"), reason="a build without FMI")
+
+
+def impacts(e, until):
+    """Of a ball that falls from 10 m."""
+    first = math.sqrt(20 / 9.81)
+    times, flight = [first], 2 * first * e
+    while times[-1] + flight < until:
+        times.append(times[-1] + flight)
+        flight *= e
+    return times
+
+
+@pytest.mark.parametrize("name", ["fmu_ball.fmu", "fmu_ball-2.fmu"])
+def test_impacts_of_a_ball_by_model_exchange(name):
+    ball = ricochet.load_fmu(f"{FMUS}/{name}")
+    assert ball.states == ["height", "velocity"] and ball.variables["height"].unit == "m"
+    ball.parameters["restitution"] = 0.5
+    run = ball.simulate(t_end=4, rtol=1e-4, output=["height", "events"])
+    assert run.success and run.method == "dopri5"
+    expected = impacts(0.5, 4)
+    # The motion is a quadratic: what is left is the location, a double of 4.4e-16 s, and the rounding of the sum.
+    np.testing.assert_allclose([event.t for event in run.events], expected, rtol=0, atol=2e-15)
+    assert all(event.causes == ["state"] and event.before[1] < 0 < event.after[1] for event in run.events)
+    assert run["events"][-1] == len(expected)
+    assert np.all(np.diff(run.t) >= 0) and np.count_nonzero(run.sides) == 2 * len(expected)
+    assert run["height"][0] == 10 and run.t[-1] == 4
+
+
+def test_inputs_are_tables_or_functions():
+    model = ricochet.load_fmu(f"{FMUS}/fmu_sampled.fmu")
+    constant = model.simulate(t_end=3, output=["x"])
+    table = model.simulate(t_end=3, inputs={"u": ([0, 3], [0.5, 0.5])}, output=["x"])
+    function = model.simulate(t_end=3, inputs={"u": lambda t: 0.5}, output=["x"])
+    assert table["x"][-1] == pytest.approx(constant["x"][-1], abs=1e-12)
+    assert function["x"][-1] == pytest.approx(constant["x"][-1], abs=1e-7)
+    with pytest.raises(ZeroDivisionError):
+        model.simulate(t_end=3, inputs={"u": lambda t: 1 / 0})
+    with pytest.raises(ValueError, match="expected a table"):
+        model.simulate(inputs={"u": 3})
+
+
+def test_co_simulation():
+    run = ricochet.load_fmu(f"{FMUS}/fmu_ball.fmu").simulate(t_end=4, step=0.5, co_simulation=True,
+                                                             output=["height"], sample_times=[4])
+    expected = impacts(0.9, 4)
+    np.testing.assert_allclose([event.t for event in run.events], expected, rtol=0, atol=1e-14)
+
+
+def test_what_does_not_fit_is_named(tmp_path):
+    (tmp_path / "m.fmu").write_text("no zip")
+    with pytest.raises(ValueError, match="no zip archive"):
+        ricochet.load_fmu(tmp_path / "m.fmu")
+    ball = ricochet.load_fmu(f"{FMUS}/fmu_ball.fmu")
+    with pytest.raises(KeyError, match="there are gravity, restitution"):
+        ball.parameters["mass"] = 1
+    with pytest.raises(ValueError, match="no variable 'mass'"):
+        ball.simulate(output=["mass"])
+    with pytest.raises(ValueError, match="expected automatic"):
+        ball.simulate(method="euler")
+    with pytest.raises(KeyError, match="recorded are height"):
+        ball.simulate(t_end=1, output=["height"])["velocity"]
