@@ -22,6 +22,7 @@ namespace ricochet::fmi {
 class Phase {
 public:
     using State = std::vector<double>;
+    static constexpr bool resets = false;
     std::size_t guard_count;
 
     Phase(Instance& instance, const Inputs& inputs)

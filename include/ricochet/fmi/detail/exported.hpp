@@ -12,19 +12,10 @@
 #include <string>
 #include <vector>
 
+#include "ricochet/fmi/variable.hpp"
 #include "ricochet/run.hpp"
 
-namespace ricochet::fmi {
-
-/// A variable of an exported model.
-struct Exported {
-    const char* name;
-    double start = 0;
-    const char* unit = "";  ///< such as "m/s"; empty: none is named
-    const char* description = "";
-};
-
-namespace detail {
+namespace ricochet::fmi::detail {
 
 /// What the description of a model says.
 struct ModelFacts {
@@ -97,6 +88,4 @@ private:
 /// Defined by RICOCHET_FMU.
 [[nodiscard]] std::unique_ptr<ExportedModel> make_exported_model();
 
-}  // namespace detail
-
-}  // namespace ricochet::fmi
+}  // namespace ricochet::fmi::detail
