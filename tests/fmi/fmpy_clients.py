@@ -17,10 +17,10 @@ PACKAGES = ["fmpy==0.3.32"]
 
 def python_with_fmpy(folder):
     """The interpreter of an environment with FMPy; none where pip cannot get it."""
-    python = folder / "fmpy" / "bin" / "python"
+    python = folder / "environment" / "bin" / "python"
     if not python.exists():
-        venv.create(folder / "fmpy", with_pip=True)
-    known = subprocess.run([python, "-c", "import fmpy"], capture_output=True)
+        venv.create(folder / "environment", with_pip=True)
+    known = subprocess.run([python, "-c", "from fmpy import simulate_fmu"], capture_output=True)
     if known.returncode == 0:
         return python
     try:
