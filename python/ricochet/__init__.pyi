@@ -527,6 +527,7 @@ def plot(run: Any, components: Optional[Sequence[int]] = None, *,
          ax: Any = None) -> Any: ...
 
 class FmuRun:
+    def __init__(self, told: Mapping[str, Any]) -> None: ...
     outcome: str
     message: str
     success: bool

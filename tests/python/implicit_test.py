@@ -191,6 +191,12 @@ def test_jac_may_be_an_array_sparse_or_take_args():
     np.testing.assert_allclose(expected.y[:, -1], np.exp(-5.0), rtol=1e-2)
 
 
+def test_of_one_component_jac_may_be_a_number():
+    number = ricochet.solve_ivp(lambda t, y: -3 * y, (0, 1), [1.0], method="Radau", jac=lambda t, y: -3.0)
+    matrix = ricochet.solve_ivp(lambda t, y: -3 * y, (0, 1), [1.0], method="Radau", jac=lambda t, y: [[-3.0]])
+    assert number.success and number.y[0, -1] == matrix.y[0, -1]
+
+
 def test_complex_states_have_complex_jacobians():
     w = [-1000.0 + 2.0j, -1.0 + 1.0j]
 

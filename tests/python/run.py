@@ -3,10 +3,15 @@
 import importlib.util
 import sys
 
-if importlib.util.find_spec("pytest") is None:
-    print("pytest was not found: the tests of the Python package are not run")
-    sys.exit(77)
 
-import pytest
+def main(arguments):
+    if importlib.util.find_spec("pytest") is None:
+        print("pytest was not found: the tests of the Python package are not run")
+        return 77
+    import pytest
 
-sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "-rs", *sys.argv[1:]]))
+    return pytest.main(["-q", "-p", "no:cacheprovider", "-rs", *arguments])
+
+
+if __name__ == "__main__":  # processes that tests start import this file
+    sys.exit(main(sys.argv[1:]))

@@ -206,8 +206,10 @@ void read_square(PyObject* result, const std::string& who, std::size_t n, double
     }
     array = reinterpret_cast<PyArrayObject*>(numbers.get());
     const auto count = static_cast<npy_intp>(n);
-    if (PyArray_NDIM(array) != 2 || PyArray_DIM(array, 0) != count ||
-        PyArray_DIM(array, 1) != count) {
+    const bool is_square = PyArray_NDIM(array) == 2 && PyArray_DIM(array, 0) == count &&
+                           PyArray_DIM(array, 1) == count;
+    // Of one component a number is enough, as for SciPy's LSODA.
+    if (!is_square && !(n == 1 && PyArray_SIZE(array) == 1)) {
         const Ref shape = checked(PyObject_GetAttrString(numbers.get(), "shape"));
         const Ref text = checked(PyObject_Str(shape.get()));
         raise(PyExc_ValueError,
