@@ -19,8 +19,8 @@ constexpr std::size_t few_faces = 12;
 constexpr double hardly_less = 0.8;
 constexpr std::uint8_t most_wasted = 6;
 
-/// The lists of all squares together may be this many times as long as that of all faces, and 16 MB
-/// besides, as for two thousand places where a large disc touches thousands of faces.
+/// Largest length of the lists of all squares together, as a multiple of that of all faces, and 16
+/// MB more, as for two thousand places where a large disc touches thousands of faces.
 constexpr std::size_t most_each = 32;
 constexpr std::size_t most_besides = 1 << 22;
 

@@ -1,5 +1,5 @@
-// Archives as a test wants them, also such as nobody should send: entries are stored, or given as
-// bytes with any sizes beside them.
+// Archives as a test wants them, valid or hostile: entries are stored, or given as bytes with any
+// sizes beside them.
 #pragma once
 
 #include <array>
