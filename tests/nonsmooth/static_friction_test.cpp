@@ -318,5 +318,173 @@ TEST(StaticFriction, ReactionsThatYDoesNotDetermineEndTheRunWithItsReason)
     EXPECT_EQ(run.outcome, Outcome::not_handed_over);
 }
 
+/// A body on a plane, A v' = f(t) + r, where |r| is at most `at_rest` and, where v moves,
+/// `kinetic`.
+struct Disc {
+    static constexpr int state_size = 2, reaction_size = 2;
+    using W = Eigen::Vector2d;
+    std::function<W(double)> load;
+    double at_rest = 1, kinetic = 0.5, second_mass = 1;
+
+    void smooth(double t, const W&, W& f) const { f = load(t); }
+    void mass(Eigen::Matrix2d& a) const { a << 1, 0, 0, second_mass; }
+    [[nodiscard]] sets::Ball<2> reaction_set(double, const W&) const
+    {
+        return sets::Ball<2>(kinetic);
+    }
+    [[nodiscard]] double static_bound(double, const W&, int) const { return at_rest; }
+};
+
+/// Steps of second order at 1e-10 a step, some hundred of them.
+constexpr double of_steps = 1e-8;
+
+TEST(StaticFriction, ADiscSlipsWhereItsLoadPassesTheStaticBound)
+{
+    // The load t/5 passes 1 at 5; v' = t/5 - 1/2 along it from then on: 0.6 at 6.
+    const Disc disc{.load = [](double t) { return Disc::W(Disc::W(0.6, 0.8) * t / 5); }};
+    const auto run = hand_over(disc, Disc::W{0, 0}, {.t_end = 6});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_NEAR(run.state.w[0], 0.36, of_steps);
+    EXPECT_NEAR(run.state.w[1], 0.48, of_steps);
+    EXPECT_NEAR(run.state.reaction.norm(), 0.5, of_steps);
+    const auto held = hand_over(disc, Disc::W{0, 0}, {.t_end = 5 - 1e-9});
+    EXPECT_EQ(held.state.w, Disc::W(0, 0));
+    EXPECT_NEAR(held.state.reaction.norm(), 1, 1e-9);
+}
+
+TEST(StaticFriction, ADiscLeavesAlongTheDirectionThatItsKineticLawHasThere)
+{
+    // At 1, f = (0.6, 0.8) and W = diag(1, 1/4). With v' = lambda d and |d| = 1 the law is
+    // (lambda + W / 2) d = W f, from which d follows by one equation for lambda.
+    const Disc disc{.load = [](double t) { return Disc::W(Disc::W(0.6, 0.8) * t); },
+                    .second_mass = 4};
+    const double h = 1e-5;
+    const auto run = hand_over(disc, Disc::W{0, 0}, {.t_end = 1 + h});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    const Disc::W rate = run.state.w / h;
+    EXPECT_NEAR(rate.norm(), 0.228073260292, h);
+    EXPECT_NEAR(rate[0] / rate.norm(), 0.824092893837, h);
+    EXPECT_NEAR(rate[1] / rate.norm(), 0.566454678087, h);
+}
+
+TEST(StaticFriction, ADiscIsHeldWhereItStopsUnderALoadBetweenItsBounds)
+{
+    // Against the load 0.7: v' = 0.7 + 0.5 from -1.2, at rest at 1, where the kinetic law would
+    // carry it on.
+    const Disc disc{.load = [](double) { return Disc::W(Disc::W(0.6, 0.8) * 0.7); }};
+    const auto run = hand_over(disc, Disc::W{-0.72, -0.96}, {.t_end = 3});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_LT(run.state.w.norm(), 1e-12);
+    EXPECT_NEAR(run.state.reaction.norm(), 0.7, 1e-12);
+    // Above the static bound it turns: v' = 1.1 - 0.5 after the stop at 1 from 1.6.
+    const Disc pulled{.load = [](double) { return Disc::W(Disc::W(0.6, 0.8) * 1.1); }};
+    const auto turned = hand_over(pulled, Disc::W{-0.96, -1.28}, {.t_end = 2});
+    EXPECT_NEAR(turned.state.w.norm(), 0.6, of_steps);
+}
+
+TEST(StaticFriction, ADiscStopsUnderASmallLoadAndSlipsAgain)
+{
+    // v' = (t - 3)/2 - 1/2 from 1 against a load that turns: at rest where (t - 4)^2 / 4 = 3, held
+    // until the load (t - 3)/2 is 1 at 5, then v' = (t - 4)/2: 3/4 at 6.
+    const Disc disc{.load = [](double t) { return Disc::W(Disc::W(0.8, -0.6) * (t - 3) / 2); }};
+    const auto run = hand_over(disc, Disc::W(0.8, -0.6), {.t_end = 6});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_NEAR(run.state.w[0], 0.8 * 0.75, of_steps);
+    EXPECT_NEAR(run.state.w[1], -0.6 * 0.75, of_steps);
+}
+
+TEST(StaticFriction, ALoadThatRestsAtTheStaticBoundOfADiscMovesNothing)
+{
+    const Disc disc{.load = [](double t) { return Disc::W(0, std::min(t, 1.0)); }};
+    EXPECT_EQ(hand_over(disc, Disc::W{0, 0}, {.t_end = 2}).state.w, Disc::W(0, 0));
+    const Disc above{.load = [](double t) { return Disc::W(0, std::min(t, 1 + 1e-6)); }};
+    EXPECT_NEAR(hand_over(above, Disc::W{0, 0}, {.t_end = 2}).state.w[1], 0.500001, 1e-6);
+}
+
+/// The same body as a phase of a run beside a ball that falls on an elastic floor at g = 1; a tick
+/// at 2 does nothing.
+struct DiscBesideABall {
+    using State = std::array<double, 4>;
+    struct Motion {
+        static constexpr int state_size = 4, reaction_size = 2;
+        using W = Eigen::Vector4d;
+        static void smooth(double t, const W& w, W& f) { f << 0.6 * t / 5, 0.8 * t / 5, w[3], -1; }
+        [[nodiscard]] static sets::Ball<2> reaction_set(double, const W&)
+        {
+            return sets::Ball<2>(0.5);
+        }
+        [[nodiscard]] static double static_bound(double, const W&, int) { return 1; }
+    };
+    static void flow(double t, const State& x, State& dxdt)
+    {
+        const double speed = std::hypot(x[0], x[1]);
+        dxdt = {0.6 * t / 5 - 0.5 * x[0] / speed, 0.8 * t / 5 - 0.5 * x[1] / speed, x[3], -1};
+    }
+    [[nodiscard]] static double guard(double, const State& x) { return x[2]; }
+    [[nodiscard]] static GuardInfo guard_info() { return {.unilateral = true}; }
+    static void reset(double, State& x) { x[3] = -x[3]; }
+    [[nodiscard]] static double next_time_event(double t) { return t < 2 ? 2 : never; }
+    [[nodiscard]] static Motion set_valued() { return {}; }
+};
+
+TEST(StaticFriction, ADiscSlipsBesideOtherEventsAndThroughSnapshots)
+{
+    // Impacts of the ball from 1.125: 1.5 and 4.5.
+    const Options options{.t_end = 6, .rtol = 1e-10, .atol = 1e-10};
+    const DiscBesideABall::State x0{0, 0, 1.125, 0};
+    const auto run = integrate(DiscBesideABall{}, x0, options);
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    const DiscBesideABall::State end{0.36, 0.48, 1.125, 0};
+    for (std::size_t i = 0; i < end.size(); ++i) EXPECT_NEAR(run.x[i], end[i], of_steps) << i;
+    ASSERT_EQ(run.events.size(), 3U);
+    EXPECT_NEAR(run.events[0].t, 1.5, 1e-12);
+    EXPECT_NEAR(run.events[2].t, 4.5, 1e-12);
+
+    Simulation simulation(DiscBesideABall{}, x0, options);
+    Simulation other(DiscBesideABall{}, x0, options);
+    for (int step = 0; simulation.step(); ++step) {
+        if (step % 10 != 0) continue;
+        other.restore(simulation.save());
+        simulation.restore(other.save());
+    }
+    EXPECT_EQ(simulation.x(), run.x);
+}
+
+/// Two bodies, each with a disc: kinetic 1/2, static 1 and 2.
+struct TwoDiscs {
+    static constexpr int state_size = 4, reaction_size = 4;
+    using W = Eigen::Vector4d;
+    static void smooth(double t, const W&, W& f) { f << t, 0, 0.4 * t, 0; }
+    [[nodiscard]] static auto reaction_set(double, const W&)
+    {
+        return sets::Product(sets::Ball<2>(0.5), sets::Ball<2>(0.5));
+    }
+    [[nodiscard]] static double static_bound(double, const W&, int i) { return i == 0 ? 1 : 2; }
+};
+
+TEST(StaticFriction, DiscsAreHeldEachByItself)
+{
+    // The first slips at 1, and moves by (t - 1/2)^2 / 2 after it; the second at 5.
+    const auto run = hand_over(TwoDiscs{}, TwoDiscs::W::Zero(), {.t_end = 6});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    EXPECT_NEAR(run.state.w[0], (5.5 * 5.5 - 0.5 * 0.5) / 2, of_steps);
+    EXPECT_NEAR(run.state.w[2], 0.2 * (36 - 25) - 0.5, of_steps);
+    EXPECT_EQ(run.state.w[1], 0);
+}
+
+TEST(StaticFriction, AStaticBoundOfADiscBelowItsKineticOneIsRefused)
+{
+    const Disc disc{.load = [](double) { return Disc::W(1, 0); }, .at_rest = 0.4};
+    try {
+        (void)hand_over(disc, Disc::W(0, 0), {.t_end = 1});
+        FAIL() << "not refused";
+    } catch (const std::invalid_argument& error) {
+        const std::string text = error.what();
+        EXPECT_NE(text.find("static bound"), std::string::npos) << text;
+        EXPECT_NE(text.find("0.4"), std::string::npos) << text;
+        EXPECT_NE(text.find("0.5"), std::string::npos) << text;
+    }
+}
+
 }  // namespace
 }  // namespace ricochet::static_friction_test

@@ -89,6 +89,8 @@ public:
     AnyStep& operator=(const AnyStep&) = delete;
 
     [[nodiscard]] const Matrices& matrices() const noexcept { return matrices_; }
+    /// See `AnyInclusion::follow`.
+    void follow(const PartLaws* laws) noexcept { matrices_.follow(laws); }
     [[nodiscard]] const SchemeOptions& options() const noexcept { return options_; }
 
     /// Takes a step of h from `from`. If it has not converged, `to` is meaningless.

@@ -486,7 +486,8 @@ void check_projection(const Set& set)
 //     branch_bound(t, w, i, branch)    a bound that continues smoothly beyond y = 0, see
 //                                      branch_modes.hpp
 //     static_bound(t, w, i)            the largest |reaction i| while it holds y_i at zero, at
-//                                      least its bounds beside y_i = 0: static friction
+//                                      least its bounds beside y_i = 0: static friction; of
+//                                      discs, the size of the reaction of disc i
 //     bound_gradient(t, w, i, g)       d upper_i / dw of a BoxSet of symmetric intervals
 //                                      that depend on the state
 //

@@ -23,6 +23,7 @@
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 #include "ricochet/detail/components.hpp"
 #include "ricochet/guard.hpp"
@@ -57,6 +58,28 @@ struct RICOCHET_ALIGNED MotionInBranches {
     Eigen::Matrix<double, N, 1> rate;
     Eigen::Matrix<double, M, 1> reaction, lower, upper;
 };
+
+/// What the solvers take for the set of one part of the reactions.
+enum class PartLaw : unsigned char {
+    kinetic,        ///< that of `reaction_set`
+    within_static,  ///< the ball of `static_bound`
+    held,           ///< everything, so that y stays zero
+    given           ///< one point
+};
+
+/// The same for all parts, with the points of those that are given.
+struct PartLaws {
+    std::vector<PartLaw> of;
+    Eigen::VectorXd given;
+};
+
+/// p = the projection of z on the set that `law`, which is not the kinetic one, has.
+void project_part(PartLaw law, double bound, std::span<const double> given,
+                  std::span<const double> z, std::span<double> p);
+/// Writes its derivative into the rows of the part, which begins at reaction `first` of `count`,
+/// of a matrix that is stored row by row.
+void part_derivative(PartLaw law, double bound, std::span<const double> z, std::size_t first,
+                     std::size_t count, std::span<double> matrix);
 
 /// The functions of inclusion.hpp, which take the system first. Those that a system does not have
 /// are null. Those of a set refer to the set at (t, w).
@@ -94,6 +117,8 @@ struct RICOCHET_ALIGNED InclusionTable {
     /// A bound that is smooth beyond y = 0 where the system gives such an extension.
     double (*bound)(System, double t, const State& w, Eigen::Index i, Branch side) = nullptr;
     double (*static_bound)(System, double t, const State& w, Eigen::Index i) = nullptr;
+    /// Sizes of the discs and intervals of a set that is no box, if `static_bound` is theirs.
+    std::span<const int> parts{};
     void (*bound_gradient)(System, double t, const State& w, Eigen::Index i, State& g) = nullptr;
 
     // Functions of the modes of branches (branch_terms.hpp). Each is one call, so that nothing goes
@@ -174,12 +199,19 @@ public:
 
     bool project(double t, const State& w, const Reaction& z, Reaction& p) const
     {
+        if (laws_) return project_parts(t, w, z, p);
         return table_->project(system(), t, w, z, p);
     }
     bool derivative(double t, const State& w, const Reaction& z, double* d) const
     {
-        return table_->derivative(system(), t, w, z, d);
+        const bool fine = table_->derivative(system(), t, w, z, d);
+        if (laws_) replace_derivative(t, w, z, d);
+        return fine;
     }
+
+    [[nodiscard]] std::span<const int> parts() const noexcept { return table_->parts; }
+    /// Takes these laws for the parts of the set, which must outlive their use; none where null.
+    void follow(const PartLaws* laws) noexcept { laws_ = laws; }
     bool bounds(double t, const State& w, Reaction& lower, Reaction& upper) const
     {
         if (table_->bounds) return table_->bounds(system(), t, w, lower, upper);
@@ -265,10 +297,54 @@ public:
     }
 
 private:
+    /// Calls `visit(law, first reaction, their number, static bound)` for the parts whose law is
+    /// not the kinetic one.
+    template <class Visit>
+    void for_parts(double t, const State& w, const Visit& visit) const
+    {
+        std::size_t first = 0;
+        for (std::size_t k = 0; k < parts().size(); ++k) {
+            const PartLaw law = laws_->of[k];
+            const auto n = static_cast<std::size_t>(parts()[k]);
+            const double bound = law == PartLaw::within_static
+                                     ? static_bound(t, w, static_cast<Eigen::Index>(k))
+                                     : 0;
+            if (law != PartLaw::kinetic) visit(law, first, n, bound);
+            first += n;
+        }
+    }
+    bool project_parts(double t, const State& w, const Reaction& z, Reaction& p) const;
+    void replace_derivative(double t, const State& w, const Reaction& z, double* d) const;
+
     const Table* table_;
     std::shared_ptr<const void> system_;
     Eigen::Index size_, reactions_;
+    const PartLaws* laws_ = nullptr;
 };
+
+template <int N, int M>
+bool AnyInclusion<N, M>::project_parts(double t, const State& w, const Reaction& z,
+                                       Reaction& p) const
+{
+    const Reaction from = z;
+    const bool fine = table_->project(system(), t, w, from, p);
+    for_parts(t, w, [&](PartLaw law, std::size_t first, std::size_t n, double bound) {
+        project_part(law, bound, span_of(laws_->given).subspan(first, n),
+                     span_of(from).subspan(first, n), span_of(p).subspan(first, n));
+    });
+    return fine;
+}
+
+template <int N, int M>
+void AnyInclusion<N, M>::replace_derivative(double t, const State& w, const Reaction& z,
+                                            double* d) const
+{
+    const std::span<const double> at = span_of(z);
+    const std::span<double> all(d, at.size() * at.size());
+    for_parts(t, w, [&](PartLaw law, std::size_t first, std::size_t n, double bound) {
+        part_derivative(law, bound, at.subspan(first, n), first, at.size(), all);
+    });
+}
 
 /// Rank of a square matrix to working precision. Writes its inverse if it has one.
 [[nodiscard]] Eigen::Index invert(const Eigen::MatrixXd& a, Eigen::MatrixXd& inverse);
@@ -290,6 +366,8 @@ public:
     explicit AnyMatrices(const Any& inclusion);
 
     [[nodiscard]] const Any& inclusion() const noexcept { return inclusion_; }
+    /// See `AnyInclusion::follow`.
+    void follow(const PartLaws* laws) noexcept { inclusion_.follow(laws); }
     [[nodiscard]] const InclusionTraits& traits() const noexcept { return inclusion_.traits(); }
     /// Of the vectors, N and M where these are fixed.
     [[nodiscard]] Eigen::Index size() const noexcept { return mass_.rows(); }

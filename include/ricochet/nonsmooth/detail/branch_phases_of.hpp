@@ -15,6 +15,7 @@
 #include "ricochet/nonsmooth/detail/false_position.hpp"
 #include "ricochet/nonsmooth/detail/held_reactions.hpp"
 #include "ricochet/nonsmooth/detail/implicit_phases.hpp"
+#include "ricochet/nonsmooth/detail/phases_of_parts.hpp"
 
 namespace ricochet::detail {
 
@@ -470,6 +471,11 @@ Owner<BranchPhases> make_branch_phases(const AnyInclusion<N, M>& inclusion,
         const InclusionTraits& traits = inclusion.traits();
         if (traits.box && traits.of_reactions()) {
             return Owner<BranchPhases>(new BranchPhasesOf<N, M>(inclusion, options));
+        }
+    }
+    if constexpr (M != 1) {
+        if (!inclusion.parts().empty()) {
+            return Owner<BranchPhases>(new PhasesOfParts<N, M>(inclusion, options));
         }
     }
     return Owner<BranchPhases>(new ImplicitPhases<N, M>(inclusion, options));

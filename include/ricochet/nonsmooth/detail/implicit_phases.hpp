@@ -360,7 +360,7 @@ protected:
         for (Eigen::Index i = 0; i < v.size(); ++i) v[i] = memory[next++];
     }
 
-    [[nodiscard]] bool select(State& at) const
+    [[nodiscard]] virtual bool select(State& at)
     {
         try {
             at.reaction = minimal_selection(matrices(), at.t, at.w, options_.step);
@@ -384,19 +384,23 @@ protected:
         }
         return true;
     }
+    enum class Placed { at_end_of_last, at_start_of_last, anew };
     /// Sets the start of a step, with the reaction of the step before; after anything else that of
     /// the minimal selection.
-    void place(const ImplicitStart& from)
+    Placed place(const ImplicitStart& from)
     {
         from_.t = from.t;
         from_.w = vector(from.x);
         if (continues(from.t, from.x)) {
             from_.reaction = to_.reaction;
-        } else if (from_is_to_.t == from.t && from_is_to_.w == from_.w) {
-            from_.reaction = from_is_to_.reaction;  // another attempt
-        } else if (!select(from_)) {
-            from_.reaction.setZero();
+            return Placed::at_end_of_last;
         }
+        if (from_is_to_.t == from.t && from_is_to_.w == from_.w) {
+            from_.reaction = from_is_to_.reaction;  // another attempt
+            return Placed::at_start_of_last;
+        }
+        if (!select(from_)) from_.reaction.setZero();
+        return Placed::anew;
     }
     [[nodiscard]] bool solve(double h, State& to, const BranchesOf<M>* frozen)
     {

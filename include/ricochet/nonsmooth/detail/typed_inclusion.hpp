@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <memory>
 #include <string>
 
@@ -20,6 +21,33 @@ template <class From, class To>
     constexpr Eigen::Index count = From::SizeAtCompileTime;
     for_each_component(to, [&](auto i) { to[i] = i < count ? from[i < count ? i : 0] : 0; });
 }
+
+/// Sizes of the discs and intervals that a set is the product of; none for other sets.
+template <class Set>
+struct SetParts {
+    static constexpr std::array<int, 0> sizes{};
+};
+template <>
+struct SetParts<sets::IntervalSet> {
+    static constexpr std::array<int, 1> sizes{1};
+};
+template <std::size_t N>
+struct SetParts<sets::Ball<N>> {
+    static constexpr std::array<int, 1> sizes{static_cast<int>(N)};
+};
+template <class... Sets>
+requires(!SetParts<Sets>::sizes.empty() && ...) struct SetParts<sets::Product<Sets...>> {
+    static constexpr std::size_t count = (SetParts<Sets>::sizes.size() + ... + 0);
+    static constexpr std::array<int, count> sizes = [] {
+        std::array<int, count> all{};
+        std::size_t next = 0;
+        const auto add = [&](const auto& some) {
+            for (const int size : some) all[next++] = size;
+        };
+        (add(SetParts<Sets>::sizes), ...);
+        return all;
+    }();
+};
 
 template <class System, int N, int M>
 class TypedInclusion {
@@ -72,9 +100,12 @@ class TypedInclusion {
         s.bound_gradient(0.0, w, i, g);
     };
     static constexpr bool branching = has_modes<n, m> && (box || continues_bounds);
-    static_assert(!HasStaticBound<System> || (has_modes<n, m> && box && of_reactions),
+    static constexpr bool in_parts = m != 1 && !box && !SetParts<Set>::sizes.empty();
+    static_assert(!HasStaticBound<System> ||
+                      (of_reactions && ((has_modes<n, m> && box) || in_parts)),
                   "ricochet: found static_bound in an inclusion without branches; expected a box "
-                  "of one to four reactions in a system of fixed size");
+                  "of one to four reactions in a system of fixed size, or a product of discs "
+                  "sets::Ball and intervals sets::IntervalSet");
     static constexpr bool declares_inputs = DeclaresStepInputs<System, OwnState, OwnReaction>;
     /// Padded reactions of a box have the offset -1.
     static constexpr bool pads_offset = m != M && box && of_reactions;
@@ -444,8 +475,13 @@ public:
         if constexpr (box || continues_bounds) out.bound = bound;
         if constexpr (HasStaticBound<System>) {
             out.static_bound = [](S s, double t, const State& w, Eigen::Index i) -> double {
-                return i < m ? at(s).static_bound(t, state(w), static_cast<int>(i)) : 0;
+                if constexpr (in_parts) {
+                    return at(s).static_bound(t, state(w), static_cast<int>(i));
+                } else {
+                    return i < m ? at(s).static_bound(t, state(w), static_cast<int>(i)) : 0;
+                }
             };
+            if constexpr (in_parts) out.parts = SetParts<Set>::sizes;
         }
         if constexpr (gives_bound_gradient) {
             out.bound_gradient = [](S s, double t, const State& w, Eigen::Index i, State& g) {
