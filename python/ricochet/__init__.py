@@ -17,8 +17,7 @@ from ._ivp import solve_ivp
 from ._monitor import Cut, Monitor, Verdict
 from ._network import Network
 from ._plot import plot
-from ._ready import (BouncingBall, CoulombOscillator, ImpactOscillator, Pendulum, StickSlip,
-                     Thermostat)
+from ._ready import SYSTEMS as _READY
 from ._ricochet import Run, Snapshot, Solution, Times, __version__
 from ._run import Kind, Simulation, integrate
 from ._scene import Scene, SceneKind, SceneRun
@@ -26,11 +25,13 @@ from ._solution import OdeResult
 from ._system import Guard, Stop, System, every, guard
 from ._training import Certified, Trained, certify, train_classifier, train_gate
 
+globals().update(_READY)  # BouncingBall and the other ready systems
+
 __all__ = [
-    "BouncingBall", "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified", "Compiled",
-    "CoulombOscillator", "Cut", "Ensemble", "Filippov", "Fmu", "FmuRun", "Guard", "ImpactOscillator", "Inclusion",
-    "Kind", "Monitor", "Network", "OdeResult", "Pendulum", "Run", "Scene", "SceneKind", "SceneRun", "Simulation",
-    "Snapshot", "Solution", "StickSlip", "Stop", "System", "Thermostat", "Times", "Trained", "Verdict", "certify",
-    "ensemble", "every", "guard", "integrate", "load_fmu", "plot", "row_seed", "solve_ivp", "train_classifier",
-    "train_gate",
+    "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified", "Compiled", "Cut",
+    "Ensemble", "Filippov", "Fmu", "FmuRun", "Guard", "Inclusion", "Kind", "Monitor", "Network",
+    "OdeResult", "Run", "Scene", "SceneKind", "SceneRun", "Simulation", "Snapshot", "Solution",
+    "Stop", "System", "Times", "Trained", "Verdict", "certify", "ensemble", "every", "guard",
+    "integrate", "load_fmu", "plot", "row_seed", "solve_ivp", "train_classifier", "train_gate",
+    *_READY,
 ]

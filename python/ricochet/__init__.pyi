@@ -7,6 +7,8 @@ from typing import (Any, Callable, Iterable, Iterator, Mapping, MutableMapping, 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._ready import *
+
 __version__: str
 
 C_FLOW: str
@@ -169,49 +171,6 @@ class Filippov(System):
     def start_mode(self, t: float, x: ArrayLike, tolerance: float = 0.0) -> str: ...
     def shares(self, mode: str, t: float, x: ArrayLike) -> _Floats: ...
 
-class _Ready:
-    modes: Optional[Tuple[str, ...]]
-    state: Tuple[str, ...]
-    @property
-    def parameters(self) -> dict[str, float]: ...
-    def __getattr__(self, name: str) -> float: ...
-
-class BouncingBall(_Ready):
-    start: Tuple[float, float]
-    def __init__(self, *, gravity: float = 9.81, restitution: float = 0.9) -> None: ...
-    def impact_time(self, n: int, height: float, velocity: float = 0.0) -> float: ...
-    def zeno_time(self, height: float, velocity: float = 0.0) -> float: ...
-
-class Pendulum(_Ready):
-    start: Tuple[float, float]
-    def __init__(self, *, gravity: float = 9.8, length: float = 1.0) -> None: ...
-    def half_period(self, amplitude: float = -0.05) -> float: ...
-
-class ImpactOscillator(_Ready):
-    start: Tuple[float, float]
-    def __init__(self, *, frequency: float = 0.7, wall: float = 1.0, restitution: float = 0.8,
-                 damping: float = 0.1) -> None: ...
-    def impacts(self, t_end: float) -> list[float]: ...
-
-class CoulombOscillator(_Ready):
-    start: Tuple[float, float]
-    def __init__(self, *, mass: float = 1.0, stiffness: float = 1.0, friction: float = 0.3,
-                 static_friction: float = 0.3) -> None: ...
-    def turning_time(self, n: int) -> float: ...
-    def turning_point(self, n: int, start: float = 2.0) -> float: ...
-
-class StickSlip(_Ready):
-    start: Tuple[float, float]
-    period: float
-    def __init__(self, *, mass: float = 1.0, stiffness: float = 1.0, belt_speed: float = 0.2,
-                 friction: float = 1.0, weakening: float = 3.0) -> None: ...
-
-class Thermostat(_Ready):
-    start: Tuple[float]
-    def __init__(self, *, rate: float = 0.1, ambient: float = 0.0, heated: float = 30.0,
-                 low: float = 18.0, high: float = 22.0) -> None: ...
-    def switch_time(self, n: int, temperature: float = 20.0) -> float: ...
-
 class Ensemble:
     rows: NDArray[Any]
     failures: dict[int, str]
@@ -232,7 +191,7 @@ class Ensemble:
     def __len__(self) -> int: ...
     def __getattr__(self, name: str) -> NDArray[Any]: ...
 
-def ensemble(system: Union[System, _Ready, Callable[..., Union[System, _Ready]]], table: Any,
+def ensemble(system: Union[System, Ready, Callable[..., Union[System, Ready]]], table: Any,
              t_end: float, *, parameters: Any = None,
              columns: Optional[Sequence[str]] = None, x0: Optional[ArrayLike] = None,
              threads: Optional[int] = None, executor: Any = None,
@@ -241,7 +200,7 @@ def ensemble(system: Union[System, _Ready, Callable[..., Union[System, _Ready]]]
 
 def row_seed(seed: int, index: int) -> int: ...
 
-def integrate(system: Union[System, _Ready], x0: ArrayLike, t_end: float, *,
+def integrate(system: Union[System, Ready], x0: ArrayLike, t_end: float, *,
               t_start: float = 0.0, continues: bool = False, mode: Any = ..., method: str = "dopri5", fixed: bool = False,
               step: float = 0.0, rtol: float = 1e-8, atol: ArrayLike = 1e-10, h_min: float = 0.0,
               h_max: float = ..., event_tolerance: float = 0.0, event_rtol: float = 0.0,
@@ -253,7 +212,7 @@ def integrate(system: Union[System, _Ready], x0: ArrayLike, t_end: float, *,
               progress: Union[None, bool, Callable[[float, float], Any]] = None) -> Run: ...
 
 class Simulation:
-    def __init__(self, system: Union[System, _Ready], x0: ArrayLike, t_end: float,
+    def __init__(self, system: Union[System, Ready], x0: ArrayLike, t_end: float,
                  **options: Any) -> None: ...
     def __iter__(self) -> Iterator[Tuple[float, _Floats]]: ...
     def step(self) -> bool: ...
@@ -409,14 +368,14 @@ class Certified:
                  counterexample: Optional[_Floats], seconds: float) -> None: ...
 
 def train_classifier(
-    system: Union[System, _Ready], starts: Any, *, step: float, mode: Any = None,
+    system: Union[System, Ready], starts: Any, *, step: float, mode: Any = None,
     method: str = "rk4", progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None,
     seed: int = 1, run_length: float = 10.0, surface_points: int = 2000, states: int = 100_000,
     fresh_states: int = 40_000, trial_events: int = 1000, hidden: Sequence[int] = (16, 16),
     iterations: int = 20_000, **options: Any) -> Trained: ...
 
 def train_gate(
-    system: Union[System, _Ready], starts: Any, levels: Optional[Sequence[float]] = None, *,
+    system: Union[System, Ready], starts: Any, levels: Optional[Sequence[float]] = None, *,
     step: Union[None, float, Tuple[float, float]] = None, mode: Any = None,
     method: Optional[str] = None,
     progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None, seed: int = 1,
@@ -425,7 +384,7 @@ def train_gate(
     iterations: int = 4000, **options: Any) -> Trained: ...
 
 def certify(
-    network: Union[str, PathLike[str], Network], system: Union[System, _Ready],
+    network: Union[str, PathLike[str], Network], system: Union[System, Ready],
     slack: Union[Sequence[float], Callable[[_Floats], float]], *,
     least: Optional[Callable[[_Floats, _Floats], float]] = None,
     progress: Union[None, bool, Callable[[SimpleNamespace], Any]] = None, margin: float = 0.0,
@@ -452,7 +411,7 @@ class Cut(NamedTuple):
     state_changed: bool
 
 class Monitor:
-    def __init__(self, system: Union[System, _Ready], like: ArrayLike, *, backward: bool = False,
+    def __init__(self, system: Union[System, Ready], like: ArrayLike, *, backward: bool = False,
                  cut_at_all: bool = False, event_tolerance: float = 0.0, event_rtol: float = 0.0,
                  event_window: float = 0.0, check_inside: bool = True, record_events: bool = True,
                  event_states: bool = True, detector: str = "extremum",
@@ -512,7 +471,7 @@ class OdeResult(dict[str, Any]):
     run: Optional[Run]
     def __getattr__(self, name: str) -> Any: ...
 
-def solve_ivp(fun: Union[Callable[..., Any], Compiled, System, _Ready],
+def solve_ivp(fun: Union[Callable[..., Any], Compiled, System, Ready],
               t_span: Tuple[float, float], y0: ArrayLike, method: Any = "RK45",
               t_eval: Optional[ArrayLike] = None, dense_output: bool = False,
               events: Any = None, vectorized: bool = False, args: Optional[Sequence[Any]] = None, *,

@@ -1,5 +1,7 @@
 """Ready systems: the library's own, which run at the speed of C++."""
 
+import inspect
+
 from . import _ricochet
 from ._numbers import number_from
 
@@ -47,9 +49,6 @@ class Ready:
                                  f"expected another system: {type(self).__name__}({name}=...)")
         super().__setattr__(name, value)
 
-    def _known(self, what, *arguments):
-        return _ricochet.closed_form(self._source, what, [number_from(a, what) for a in arguments])
-
     def __repr__(self):
         given = ", ".join(f"{name}={value!r}" for name, value in self._parameters.items())
         return f"{type(self).__name__}({given})"
@@ -62,122 +61,73 @@ def _again(cls, parameters):
     return cls(**parameters)
 
 
-class BouncingBall(Ready):
-    """A point mass falling onto a rigid floor at height 0.
-
-    State (height [m], velocity [m/s]); the floor is a unilateral guard with the reset
-    v+ = -restitution v-, and the ball rests after infinitely many impacts.
-    """
-
-    _name = "bouncing-ball"
-    state = ("height", "velocity")
-    start = (10.0, 0.0)
-
-    def __init__(self, *, gravity=9.81, restitution=0.9):
-        super().__init__(gravity=gravity, restitution=restitution)
-
-    def impact_time(self, n, height, velocity=0.0):
-        """Time [s] of impact n = 0, 1, 2, ..., in closed form."""
-        return self._known("impact_time", n, height, velocity)[0]
-
-    def zeno_time(self, height, velocity=0.0):
-        """Limit [s] of the times of impact; infinite for restitution 1."""
-        return self._known("zeno_time", height, velocity)[0]
+def _signature(parameters, kind):
+    """A signature of `self` and of pairs of a name and a default, None where there is none."""
+    own = [inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)]
+    empty = inspect.Parameter.empty
+    return inspect.Signature(own + [
+        inspect.Parameter(name, kind, default=empty if default is None else default)
+        for name, default in parameters])
 
 
-class Pendulum(Ready):
-    """A point mass on a massless rod, swinging without friction.
+def _known_function(system, known):
+    """The method for a function of the known motion."""
+    name = known["name"]
+    whole = [argument[0] for argument in known["arguments"] if argument[2]]
+    signature = _signature([argument[:2] for argument in known["arguments"]],
+                           inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
-    State (angle [rad], rate [rad/s]); its turning points are recorded.
-    """
+    def function(self, *given, **named):
+        bound = signature.bind(self, *given, **named)
+        bound.apply_defaults()
+        arguments = [number_from(value, key) for key, value in bound.arguments.items()
+                     if key != "self"]
+        values = _ricochet.closed_form(system, name, list(self._parameters.values()), arguments)
+        return values if known["many"] else values[0]
 
-    _name = "pendulum"
-    state = ("angle", "rate")
-    start = (-0.05, 0.0)
-
-    def __init__(self, *, gravity=9.8, length=1.0):
-        super().__init__(gravity=gravity, length=length)
-
-    def half_period(self, amplitude=-0.05):
-        """Time [s] between turning points at +-amplitude [rad], in closed form."""
-        return self._known("half_period", amplitude)[0]
-
-
-class ImpactOscillator(Ready):
-    """A damped oscillator under a harmonic force, with a rigid wall on one side.
-
-    State (position, velocity), dimensionless; the wall is a unilateral guard with the reset
-    v+ = -restitution v-.
-    """
-
-    _name = "impact-oscillator"
-    state = ("position", "velocity")
-    start = (0.0, 0.0)
-
-    def __init__(self, *, frequency=0.7, wall=1.0, restitution=0.8, damping=0.1):
-        super().__init__(frequency=frequency, wall=wall, restitution=restitution,
-                         damping=damping)
-
-    def impacts(self, t_end):
-        """Times of all impacts from `start` up to ``t_end``, in closed form."""
-        return self._known("impacts", t_end)
+    function.__name__ = name
+    function.__qualname__ = f"Ready.{name}"
+    function.__signature__ = signature
+    function.__doc__ = known["meaning"].replace("`", "``") + "\n\nIn closed form." + (
+        f" {whole[0]} is a whole number." if whole else "")
+    return function
 
 
-class CoulombOscillator(Ready):
-    """A mass on a spring under Coulomb's friction.
-
-    State (position [m], velocity [m/s]); it stops, turns, and sticks at last.
-    """
-
-    _name = "coulomb-oscillator"
-    state = ("position", "velocity")
-    modes = ("slip-left", "slip-right", "stick")
-    start = (2.0, 0.0)
-
-    def __init__(self, *, mass=1.0, stiffness=1.0, friction=0.3, static_friction=0.3):
-        super().__init__(mass=mass, stiffness=stiffness, friction=friction,
-                         static_friction=static_friction)
-
-    def turning_time(self, n):
-        """Time [s] of the n-th stop after a start at rest, n = 1, 2, ..."""
-        return self._known("turning_time", n)[0]
-
-    def turning_point(self, n, start=2.0):
-        """Where [m] the n-th stop is after a start at rest at ``start`` [m]."""
-        return self._known("turning_point", n, start)[0]
+def _doc(of):
+    """The docstring of a ready system."""
+    lines = [of["description"], ""]
+    lines += [*of["equations"], ""] if of["equations"] else []
+    lines += ["State: " + ", ".join(f"{title} [{unit}]" for title, _, unit, _ in of["state"]) + ".",
+              "", "Parameters", "----------"]
+    for name, initial, unit, values, meaning in of["parameters"]:
+        lines += [f"{name.replace('-', '_')} : float, default {initial:g}",
+                  f"    [{unit}] in {values}: {meaning}."]
+    if of["source"]:
+        lines += ["", f"({of['source']}.)"]
+    return "\n".join(lines)
 
 
-class StickSlip(Ready):
-    """A mass held by a spring on a moving belt, under friction that falls with the sliding speed.
+def _ready_class(of):
+    """The class of a ready system, by its description."""
+    signature = _signature([(name.replace("-", "_"), initial)
+                            for name, initial, *_ in of["parameters"]],
+                           inspect.Parameter.KEYWORD_ONLY)
 
-    State (position [m], velocity [m/s]).
-    """
+    def __init__(self, **parameters):
+        bound = signature.bind(self, **parameters)
+        bound.apply_defaults()
+        Ready.__init__(self, **{name: value for name, value in bound.arguments.items()
+                                if name != "self"})
 
-    _name = "stick-slip"
-    state = ("position", "velocity")
-    modes = ("slip-left", "slip-right", "stick")
-    start = (1.0, 0.2)
-    period = 12.001031294830578647  #: [s] with the default parameters
+    __init__.__signature__ = signature
+    members = {"__init__": __init__, "__doc__": _doc(of), "__module__": "ricochet",
+               "_name": of["name"], "state": tuple(title for title, *_ in of["state"]),
+               "start": tuple(start for _, start, *_ in of["state"]),
+               "modes": tuple(of["modes"]) or None, **dict(of["constants"])}
+    for known in of["known"]:
+        members[known["name"]] = _known_function(of["name"], known)
+    return type(of["type"], (Ready,), members)
 
-    def __init__(self, *, mass=1.0, stiffness=1.0, belt_speed=0.2, friction=1.0, weakening=3.0):
-        super().__init__(mass=mass, stiffness=stiffness, belt_speed=belt_speed,
-                         friction=friction, weakening=weakening)
 
-
-class Thermostat(Ready):
-    """The temperature of a room with a heater that is switched on and off.
-
-    State (temperature [degrees],).
-    """
-
-    _name = "thermostat"
-    state = ("temperature",)
-    modes = ("off", "on")
-    start = (20.0,)
-
-    def __init__(self, *, rate=0.1, ambient=0.0, heated=30.0, low=18.0, high=22.0):
-        super().__init__(rate=rate, ambient=ambient, heated=heated, low=low, high=high)
-
-    def switch_time(self, n, temperature=20.0):
-        """Time [s] of switch n = 0, 1, 2, ...; the even ones switch the heater on."""
-        return self._known("switch_time", n, temperature)[0]
+#: The classes of the ready systems by their names.
+SYSTEMS = {of["type"]: _ready_class(of) for of in _ricochet.ready_descriptions()}

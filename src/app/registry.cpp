@@ -1,22 +1,8 @@
 #include "registry.hpp"
 
-#include <fmt/format.h>
-
 #include "input.hpp"
 
 namespace ricochet::app {
-
-bool Range::contains(double value) const noexcept
-{
-    return (lower_included ? value >= lower : value > lower) &&
-           (upper_included ? value <= upper : value < upper);
-}
-
-std::string to_string(const Range& range)
-{
-    return fmt::format("{}{}, {}{}", range.lower_included ? '[' : '(', range.lower, range.upper,
-                       range.upper_included ? ']' : ')');
-}
 
 namespace {
 

@@ -1,8 +1,8 @@
 // The systems that the command line knows, as values.
 //
-// A system is added by a function in a file of systems/ that returns its entry, which
-// systems/entries.hpp declares and lists. If a system needs more than the core, its functions are
-// in a file of the program that simulates it.
+// A ready system of the core has its entry from its descriptor. Another one is added by a function
+// in a file of systems/ that returns its entry, which systems/entries.hpp declares and lists. If a
+// system needs more than the core, its functions are in a file of the program that simulates it.
 #pragma once
 
 #include <cstddef>
@@ -15,36 +15,14 @@
 
 #include "ricochet/guard.hpp"
 #include "ricochet/run.hpp"
+#include "ricochet/systems/descriptor.hpp"
 #include "settings.hpp"
 
 namespace ricochet::app {
 
-/// The values that a parameter may have.
-struct Range {
-    double lower = -std::numeric_limits<double>::infinity();
-    double upper = std::numeric_limits<double>::infinity();
-    bool lower_included = false;
-    bool upper_included = false;
-
-    [[nodiscard]] bool contains(double value) const noexcept;
-};
-
-/// "[0, 1]", "(0, inf)"
-[[nodiscard]] std::string to_string(const Range& range);
-
-struct Parameter {
-    std::string_view name;
-    double initial;         ///< default value
-    std::string_view unit;  ///< "1" where it has none
-    Range range;
-    std::string_view meaning;
-};
-
-struct Component {
-    std::string_view name;
-    std::string_view unit;
-    std::string_view meaning;
-};
+using Range = ParameterRange;
+using Parameter = ParameterInfo;
+using Component = ComponentInfo;
 
 /// A guard, and the event on its surface.
 struct GuardLabel {

@@ -4,8 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
+#include <vector>
 
 #include "base/require.hpp"
+#include "ricochet/systems/descriptor.hpp"
 
 namespace ricochet {
 
@@ -156,6 +159,58 @@ std::vector<double> ImpactOscillator::impacts(double t_end) const
         now = {p_.wall, -p_.restitution * flight(s).v};
         times.push_back(static_cast<double>(t));
     }
+}
+
+const SystemDescriptor& ImpactOscillator::descriptor()
+{
+    using Numbers = std::span<const double>;
+    static const SystemDescriptor all{
+        .name = name,
+        .type = "ImpactOscillator",
+        .description = "A forced and damped oscillator hits a wall on one side.",
+        .source =
+            "S. W. Shaw and P. J. Holmes, A periodically forced piecewise linear "
+            "oscillator, Journal of Sound and Vibration 90, 1983, pages 129 to 155",
+        .equations = {"u'' = cos(frequency t) - u - damping u' while u <= wall",
+                      "impact at u = wall: v+ = -restitution v"},
+        .parameters =
+            {{.name = "frequency",
+              .initial = Parameters{}.frequency,
+              .unit = "1",
+              .range = {.lower = 0},
+              .meaning = "of the force, in units of the oscillator's own"},
+             {.name = "wall",
+              .initial = Parameters{}.wall,
+              .unit = "1",
+              .range = {.lower = 0},
+              .meaning = "position of the wall"},
+             {.name = "restitution",
+              .initial = Parameters{}.restitution,
+              .unit = "1",
+              .range = {.lower = 0, .upper = 1, .lower_included = true, .upper_included = true},
+              .meaning = "Newton's coefficient, speed after over speed before"},
+             {.name = "damping",
+              .initial = Parameters{}.damping,
+              .unit = "1",
+              .range = {.lower = 0, .upper = 2},
+              .meaning = "twice the damping ratio"}},
+        .state = {{.name = "u", .unit = "1", .meaning = "position", .title = "position"},
+                  {.name = "v", .unit = "1", .meaning = "velocity", .title = "velocity"}},
+        .events = {"impact"},
+        .t_end = 100,
+        .comparison_step = 0.01,
+        .known = {{.name = "impacts",
+                   .meaning = "Times of all impacts from the default start up to `t_end`.",
+                   .arguments = {{.name = "t_end"}},
+                   .values =
+                       [](Numbers p, Numbers a) {
+                           return with_parameters<ImpactOscillator>(p).impacts(a[0]);
+                       },
+                   .many = true}},
+        .event_times = [](Numbers p, Numbers /*x0*/, double until) {
+            return with_parameters<ImpactOscillator>(p).impacts(until);
+        }};
+    return all;
 }
 
 }  // namespace ricochet

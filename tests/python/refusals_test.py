@@ -551,10 +551,10 @@ def test_modes_that_cannot_be_told_apart(modes, words):
     (lambda: ricochet.BouncingBall().impact_time(-1, 10), "impact_time: found n = -1"),
     (lambda: ricochet.BouncingBall().impact_time(0.5, 10), "impact_time: found n = 0.5"),
     (lambda: ricochet.BouncingBall().impact_time(2**31, 10), "n = 2147483648"),
-    (lambda: ricochet.BouncingBall().impact_time(math.nan, 10), "impact_time: found nan"),
+    (lambda: ricochet.BouncingBall().impact_time(math.nan, 10), "impact_time: found n = nan"),
     (lambda: ricochet.CoulombOscillator().turning_time(1.5), "turning_time: found n = 1.5"),
     (lambda: ricochet.Thermostat().switch_time(-2), "switch_time: found n = -2"),
-    (lambda: ricochet.ImpactOscillator().impacts(math.inf), "impacts: found inf")])
+    (lambda: ricochet.ImpactOscillator().impacts(math.inf), "impacts: found t_end = inf")])
 def test_known_solutions_where_there_are_none(call, words):
     with pytest.raises(ValueError, match=words):
         call()

@@ -25,7 +25,7 @@ def mypy(tmp_path):
     package = Path(ricochet.__file__).parent
     stubs = tmp_path / "stubs" / "ricochet"
     stubs.mkdir(parents=True)
-    for name in ("__init__.pyi", "py.typed"):
+    for name in ("__init__.pyi", "_ready.pyi", "py.typed"):
         (stubs / name).write_text((package / name).read_text())
 
     def run(*arguments):
@@ -49,3 +49,14 @@ def test_stubs_are_those_of_the_package(mypy, tmp_path):
     (tmp_path / "allowed").write_text(ALLOWED)
     mypy("mypy.stubtest", "ricochet", "--concise", "--ignore-missing-stub", "--allowlist",
          str(tmp_path / "allowed"), "--ignore-unused-allowlist")
+
+
+def test_the_stubs_of_ready_systems_are_what_their_script_prints():
+    source = os.environ.get("RICOCHET_SOURCE")
+    if not source:
+        pytest.skip("RICOCHET_SOURCE is not set")
+    package = Path(ricochet.__file__).parent
+    environment = dict(os.environ, PYTHONPATH=str(package.parent))
+    out = subprocess.run([sys.executable, str(Path(source) / "scripts" / "ready_stubs")],
+                         env=environment, capture_output=True, text=True, check=True)
+    assert out.stdout == (package / "_ready.pyi").read_text()

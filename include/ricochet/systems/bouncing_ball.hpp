@@ -9,6 +9,8 @@
 
 namespace ricochet {
 
+struct SystemDescriptor;
+
 /// A point mass falling onto a rigid floor at height 0.
 ///
 /// State x = (height u [m], velocity v [m/s]); one mode, one transition.
@@ -40,6 +42,8 @@ public:
     [[nodiscard]] double restitution() const noexcept { return restitution_; }
 
     static constexpr std::string_view name = "bouncing-ball";
+    /// Names, units, ranges and what is known; see descriptor.hpp.
+    [[nodiscard]] static const SystemDescriptor& descriptor();
 
     /// The parameter of that name, for models that depend on it.
     [[nodiscard]] std::optional<double> parameter(std::string_view of) const noexcept

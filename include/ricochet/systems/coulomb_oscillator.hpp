@@ -8,6 +8,8 @@
 
 namespace ricochet {
 
+struct SystemDescriptor;
+
 /// A mass on a spring under Coulomb's friction of constant size.
 ///
 /// A `FrictionOscillator` on ground at rest: the modes slip-left, slip-right and stick,
@@ -40,6 +42,8 @@ public:
     explicit CoulombOscillator(const Parameters& parameters);
 
     static constexpr std::string_view name = "coulomb-oscillator";
+    /// Names, units, ranges and what is known; see descriptor.hpp.
+    [[nodiscard]] static const SystemDescriptor& descriptor();
     static constexpr State start{2, 0};
     static constexpr Mode start_mode = slip_left;
 

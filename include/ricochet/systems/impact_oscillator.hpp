@@ -11,6 +11,8 @@
 
 namespace ricochet {
 
+struct SystemDescriptor;
+
 /// A damped linear oscillator under a harmonic force, with a rigid wall on one side.
 ///
 /// State x = (position u, velocity v), dimensionless.
@@ -43,6 +45,8 @@ public:
     explicit ImpactOscillator(const Parameters& parameters);
 
     static constexpr std::string_view name = "impact-oscillator";
+    /// Names, units, ranges and what is known; see descriptor.hpp.
+    [[nodiscard]] static const SystemDescriptor& descriptor();
     static constexpr State start{0, 0};
 
     [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t /*which*/) noexcept

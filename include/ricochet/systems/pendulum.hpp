@@ -10,6 +10,8 @@
 
 namespace ricochet {
 
+struct SystemDescriptor;
+
 /// A point mass on a massless rod, swinging without friction.
 ///
 /// State x = (angle a [rad], rate w [rad/s]); its turning points are recorded, and change nothing.
@@ -41,6 +43,8 @@ public:
     explicit Pendulum(const Parameters& parameters);
 
     static constexpr std::string_view name = "pendulum";
+    /// Names, units, ranges and what is known; see descriptor.hpp.
+    [[nodiscard]] static const SystemDescriptor& descriptor();
     static constexpr State start{-0.05, 0};
 
     [[nodiscard]] static constexpr GuardInfo guard_info(std::size_t /*which*/) noexcept

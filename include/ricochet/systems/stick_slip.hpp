@@ -7,6 +7,8 @@
 
 namespace ricochet {
 
+struct SystemDescriptor;
+
 /// A mass held by a spring on a belt that carries it along, with friction that falls
 /// with the sliding speed.
 ///
@@ -39,6 +41,8 @@ public:
     }
 
     static constexpr std::string_view name = "stick-slip";
+    /// Names, units, ranges and what is known; see descriptor.hpp.
+    [[nodiscard]] static const SystemDescriptor& descriptor();
     static constexpr State start{1, 0.2};
     static constexpr Mode start_mode = slip_left;
 

@@ -9,6 +9,8 @@
 
 namespace ricochet {
 
+struct SystemDescriptor;
+
 /// The temperature of a room with a heater that is switched on and off.
 ///
 /// State (x), a temperature [degrees]; modes off and on.
@@ -45,6 +47,8 @@ public:
     explicit Thermostat(const Parameters& parameters);
 
     static constexpr std::string_view name = "thermostat";
+    /// Names, units, ranges and what is known; see descriptor.hpp.
+    [[nodiscard]] static const SystemDescriptor& descriptor();
     static constexpr State start{20};
     static constexpr std::size_t guard_count = 2;
     static constexpr std::size_t mode_count = 2;

@@ -1,6 +1,6 @@
 #include "ricochet/systems/stick_slip.hpp"
 
-#include "../systems/run_system.hpp"
+#include "../systems/ready_runs.hpp"
 #include "complete.hpp"
 #include "friction_inclusion.hpp"
 
@@ -9,48 +9,20 @@ namespace ricochet::app {
 namespace stick_slip {
 namespace {
 
-enum : std::size_t {
-    mass,
-    stiffness,
-    belt_speed,
-    friction,
-    weakening,
-    position,
-    velocity
-};  // the order of parameters
-
-StickSlip system(const std::vector<double>& p)
-{
-    return StickSlip({.mass = p[mass],
-                      .stiffness = p[stiffness],
-                      .belt_speed = p[belt_speed],
-                      .friction = p[friction],
-                      .weakening = p[weakening]});
-}
-
-std::vector<double> start(const std::vector<double>& p)
-{
-    return {p[position], p[velocity]};
-}
-
-Mode start_mode(const std::vector<double>& p)
-{
-    return system(p).mode_at(p[position], p[velocity]);
-}
+using Runs = ReadyRuns<StickSlip>;
 
 TimedRun run(const RunSettings& settings, int repeats)
 {
-    if (settings.set_valued) {
-        const auto& p = settings.parameters;
-        return run_oscillator(FrictionInclusion::of({.mass = p[mass],
-                                                     .stiffness = p[stiffness],
-                                                     .belt_speed = p[belt_speed],
-                                                     .friction = p[friction],
-                                                     .static_friction = p[friction],
-                                                     .weakening = p[weakening]}),
-                              {p[position], p[velocity]}, settings, repeats);
-    }
-    return run_system(system(settings.parameters), start(settings.parameters), settings, repeats);
+    if (!settings.set_valued) return Runs::run(settings, repeats);
+    const auto p = Runs::own_parameters(settings.parameters);
+    const FrictionOscillator::Parameters of{.mass = p[0],
+                                            .stiffness = p[1],
+                                            .belt_speed = p[2],
+                                            .friction = p[3],
+                                            .static_friction = p[3],
+                                            .weakening = p[4]};
+    const auto [u, v] = Runs::start(settings.parameters);
+    return run_oscillator(FrictionInclusion::of(of), {u, v}, settings, repeats);
 }
 
 /// Known events for the default parameters.
@@ -69,11 +41,9 @@ std::vector<double> exact_events(const std::vector<double>& /*p*/, double t_end)
 
 void complete_stick_slip(SystemEntry& entry)
 {
-    using namespace stick_slip;
-    entry.start = start;
-    entry.run = run;
-    entry.start_mode = start_mode;
-    entry.exact_events = exact_events;
+    stick_slip::Runs::give_to(entry);
+    entry.run = stick_slip::run;
+    entry.exact_events = stick_slip::exact_events;
 }
 
 }  // namespace ricochet::app

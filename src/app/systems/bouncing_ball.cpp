@@ -1,44 +1,11 @@
 #include "ricochet/systems/bouncing_ball.hpp"
 
-#include <array>
-
 #include "entries.hpp"
-#include "run_system.hpp"
+#include "ready_runs.hpp"
 
 namespace ricochet::app {
 
 namespace {
-
-enum : std::size_t { gravity, restitution, height, velocity };  // the order of parameters
-
-BouncingBall ball(const std::vector<double>& p)
-{
-    return BouncingBall({.gravity = p[gravity], .restitution = p[restitution]});
-}
-
-std::vector<double> start(const std::vector<double>& p)
-{
-    return {p[height], p[velocity]};
-}
-
-TimedRun run(const RunSettings& settings, int repeats)
-{
-    const std::vector<double>& p = settings.parameters;
-    return run_system(ball(p), BouncingBall::State{p[height], p[velocity]}, settings, repeats);
-}
-
-std::vector<double> exact_events(const std::vector<double>& p, double t_end)
-{
-    const BouncingBall system = ball(p);
-    std::vector<double> times;
-    constexpr int most = 1000;  // an accumulation of impacts has no end
-    for (int n = 0; n < most; ++n) {
-        const double t = system.impact_time(n, p[height], p[velocity]);
-        if (t > t_end) break;
-        times.push_back(t);
-    }
-    return times;
-}
 
 constexpr std::string_view source =
     "Saunders, Steyer and Kuether, Machine learning for event detection in non-smooth initial "
@@ -64,51 +31,14 @@ std::vector<Published> published()
 
 SystemEntry bouncing_ball_entry()
 {
-    return {
-        .name = "bouncing-ball",
-        .description =
-            "A point mass falls onto a rigid floor and bounces, losing speed at every "
-            "impact.",
-        .source =
-            "Saunders, Steyer and Kuether, Machine learning for event detection in "
-            "non-smooth initial value problems, SAND2023-06682C, eqs. 1 and 2",
-        .parameters =
-            {{.name = "gravity",
-              .initial = 9.81,
-              .unit = "m/s²",
-              .range = {.lower = 0},
-              .meaning = "acceleration downward"},
-             {.name = "restitution",
-              .initial = 0.9,
-              .unit = "1",
-              .range = {.lower = 0, .upper = 1, .lower_included = true, .upper_included = true},
-              .meaning = "Newton's coefficient, speed after over speed before"},
-             {.name = "height",
-              .initial = 10,
-              .unit = "m",
-              .range = {.lower = 0, .lower_included = true},
-              .meaning = "at the start, above the floor"},
-             {.name = "velocity",
-              .initial = 0,
-              .unit = "m/s",
-              .range = {},
-              .meaning = "at the start, upward"}},
-        .state = {{.name = "u", .unit = "m", .meaning = "height"},
-                  {.name = "v", .unit = "m/s", .meaning = "velocity"}},
-        .guards = {{.name = "floor", .event = "impact"}},
-        .t_end = 20.5,
-        .start = start,
-        .run = run,
-        .series = has_series<BouncingBall>,
-        .models = {{.file = "bouncing-ball-step-0.01.safetensors",
-                    .kind = "fixed-step",
-                    .any_step = false},
-                   {.file = "bouncing-ball.safetensors", .kind = "any-step", .any_step = true}},
-        .line = "u/(g h²) + v/(g h) <= 1/2",
-        .exact_events = exact_events,
-        .published = published(),
-        .comparison_step = 0.01,
-    };
+    SystemEntry entry = described<BouncingBall>();
+    ReadyRuns<BouncingBall>::give_to(entry);
+    entry.models = {
+        {.file = "bouncing-ball-step-0.01.safetensors", .kind = "fixed-step", .any_step = false},
+        {.file = "bouncing-ball.safetensors", .kind = "any-step", .any_step = true}};
+    entry.line = "u/(g h²) + v/(g h) <= 1/2";
+    entry.published = published();
+    return entry;
 }
 
 }  // namespace ricochet::app

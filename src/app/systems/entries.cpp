@@ -1,21 +1,20 @@
 #include "entries.hpp"
 
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
 namespace ricochet::app {
 
 std::vector<SystemEntry> all_entries()
 {
-    return {
-        bouncing_ball_entry(),
-        pendulum_entry(),
+    std::vector<SystemEntry> all = ready_entries();
+    std::vector<SystemEntry> others{
         henon_heiles_entry(),
         three_body_entry(),
         hidden_pair_entry(),
         near_tangent_entry(),
-        thermostat_entry(),
         grow_decay_entry(),
-        impact_oscillator_entry(),
-        coulomb_oscillator_entry(),
-        stick_slip_entry(),
         detest_f1_entry(),
         detest_f2_entry(),
         detest_f3_entry(),
@@ -36,6 +35,8 @@ std::vector<SystemEntry> all_entries()
         two_contact_block_entry(),
         spring_slider_entry(),
     };
+    std::move(others.begin(), others.end(), std::back_inserter(all));
+    return all;
 }
 
 }  // namespace ricochet::app

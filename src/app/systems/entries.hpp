@@ -1,21 +1,19 @@
-// The systems of the command line: one function each, in a file of this directory.
+// The systems of the command line: those of the core, and a function for each other one, in a file
+// of this directory.
 #pragma once
 
 #include "../registry.hpp"
 
 namespace ricochet::app {
 
+/// Those of the core, from their descriptors.
+[[nodiscard]] std::vector<SystemEntry> ready_entries();
 [[nodiscard]] SystemEntry bouncing_ball_entry();
-[[nodiscard]] SystemEntry pendulum_entry();
 [[nodiscard]] SystemEntry henon_heiles_entry();
 [[nodiscard]] SystemEntry three_body_entry();
 [[nodiscard]] SystemEntry hidden_pair_entry();
 [[nodiscard]] SystemEntry near_tangent_entry();
-[[nodiscard]] SystemEntry thermostat_entry();
 [[nodiscard]] SystemEntry grow_decay_entry();
-[[nodiscard]] SystemEntry impact_oscillator_entry();
-[[nodiscard]] SystemEntry coulomb_oscillator_entry();
-[[nodiscard]] SystemEntry stick_slip_entry();
 [[nodiscard]] SystemEntry detest_f1_entry();
 [[nodiscard]] SystemEntry detest_f2_entry();
 [[nodiscard]] SystemEntry detest_f3_entry();

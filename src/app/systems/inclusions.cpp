@@ -3,68 +3,11 @@
 #include "has_series.hpp"
 #include "labels.hpp"
 #include "problems/super_twisting.hpp"
-#include "ricochet/systems/coulomb_oscillator.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
 #include "ricochet/systems/friction_inclusion.hpp"
 #include "ricochet/systems/sliding_mode.hpp"
-#include "ricochet/systems/stick_slip.hpp"
 
 namespace ricochet::app {
-
-// --- coulomb oscillator ---
-
-SystemEntry coulomb_oscillator_entry()
-{
-    return {
-        .name = CoulombOscillator::name,
-        .description = "A mass on a spring comes to rest under dry friction after a few turns.",
-        .equations = {"slipping: mass u'' = -stiffness u - friction sign(v)",
-                      "sticking: u'' = 0 while stiffness |u| <= static-friction"},
-        .parameters = {{.name = "mass",
-                        .initial = 1,
-                        .unit = "kg",
-                        .range = {.lower = 0},
-                        .meaning = "of the oscillator"},
-                       {.name = "stiffness",
-                        .initial = 1,
-                        .unit = "N/m",
-                        .range = {.lower = 0},
-                        .meaning = "of the spring"},
-                       {.name = "friction",
-                        .initial = 0.3,
-                        .unit = "N",
-                        .range = {.lower = 0, .lower_included = true},
-                        .meaning = "while slipping"},
-                       {.name = "static-friction",
-                        .initial = 0.3,
-                        .unit = "N",
-                        .range = {.lower = 0, .lower_included = true},
-                        .meaning = "that sticking bears, at least friction"},
-                       {.name = "position",
-                        .initial = CoulombOscillator::start[0],
-                        .unit = "m",
-                        .range = {},
-                        .meaning = "at the start"},
-                       {.name = "velocity",
-                        .initial = CoulombOscillator::start[1],
-                        .unit = "m/s",
-                        .range = {},
-                        .meaning = "at the start"}},
-        .state = {{.name = "u", .unit = "m", .meaning = "position"},
-                  {.name = "v", .unit = "m/s", .meaning = "velocity"}},
-        .guards = labels(CoulombOscillator{}, {"stop", "pulled left", "pulled right"}),
-        .modes = mode_names_and_set_valued<CoulombOscillator>(),
-        .t_end = 10,
-        .start = nullptr,
-        .run = nullptr,
-        .series = has_series<CoulombOscillator>,
-        .comparison_step = 0.01,
-        .integrators = {"event", "handover", "bathe", "time-stepping"},
-        .set_valued_step = 0.01,
-        .known_solution = "event times in closed form",
-        .program = "nonsmooth",
-    };
-}
 
 // --- friction inclusion ---
 
@@ -135,72 +78,6 @@ SystemEntry friction_inclusion_entry()
         .run = nullptr,
         .integrators = {"handover", "event", "bathe", "time-stepping"},
         .set_valued_step = 0.01,
-        .program = "nonsmooth",
-    };
-}
-
-// --- stick slip ---
-
-SystemEntry stick_slip_entry()
-{
-    return {
-        .name = StickSlip::name,
-        .description = "A mass held by a spring sticks to a moving belt and slips, in turn.",
-        .source =
-            "R. I. Leine, D. H. van Campen, A. de Kraker and L. van den Steen, Stick-slip "
-            "vibrations induced by alternate friction models, Nonlinear Dynamics 16, 1998, "
-            "pages 41 to 54",
-        .equations = {"slipping: mass u'' = -stiffness u - F(s) sign(v - belt-speed),",
-                      "    F(s) = friction / (1 + weakening s),  s = |v - belt-speed|",
-                      "sticking: u' = belt-speed while stiffness |u| <= friction"},
-        .parameters = {{.name = "mass",
-                        .initial = 1,
-                        .unit = "kg",
-                        .range = {.lower = 0},
-                        .meaning = "of the oscillator"},
-                       {.name = "stiffness",
-                        .initial = 1,
-                        .unit = "N/m",
-                        .range = {.lower = 0},
-                        .meaning = "of the spring"},
-                       {.name = "belt-speed",
-                        .initial = 0.2,
-                        .unit = "m/s",
-                        .range = {},
-                        .meaning = "to the right"},
-                       {.name = "friction",
-                        .initial = 1,
-                        .unit = "N",
-                        .range = {.lower = 0, .lower_included = true},
-                        .meaning = "at sliding speed 0, and of sticking"},
-                       {.name = "weakening",
-                        .initial = 3,
-                        .unit = "s/m",
-                        .range = {.lower = 0, .lower_included = true},
-                        .meaning = "of friction with the sliding speed"},
-                       {.name = "position",
-                        .initial = StickSlip::start[0],
-                        .unit = "m",
-                        .range = {},
-                        .meaning = "at the start"},
-                       {.name = "velocity",
-                        .initial = StickSlip::start[1],
-                        .unit = "m/s",
-                        .range = {},
-                        .meaning = "at the start"}},
-        .state = {{.name = "u", .unit = "m", .meaning = "position"},
-                  {.name = "v", .unit = "m/s", .meaning = "velocity"}},
-        .guards = labels(StickSlip{}, {"stick", "slip left", "slip right"}),
-        .modes = mode_names_and_set_valued<StickSlip>(),
-        .t_end = 40,
-        .start = nullptr,
-        .run = nullptr,
-        .series = has_series<StickSlip>,
-        .any_parameters = false,
-        .comparison_step = 0.01,
-        .integrators = {"event", "handover", "bathe", "time-stepping"},
-        .set_valued_step = 0.01,
-        .known_solution = "event times in closed form, for the default parameters",
         .program = "nonsmooth",
     };
 }

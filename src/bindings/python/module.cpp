@@ -24,6 +24,51 @@
 
 namespace py = pybind11;
 
+namespace {
+
+using ricochet::python::ReadyDescription;
+
+py::dict described(const ricochet::KnownFunction& known)
+{
+    py::list arguments;
+    for (const auto& each : known.arguments) {
+        arguments.append(py::make_tuple(each.name, each.initial, each.whole));
+    }
+    return py::dict(py::arg("name") = known.name, py::arg("meaning") = known.meaning,
+                    py::arg("arguments") = arguments, py::arg("many") = known.many);
+}
+
+py::dict described(const ReadyDescription& of)
+{
+    const ricochet::SystemDescriptor& system = *of.system;
+    py::list parameters, state, known;
+    for (const auto& each : system.parameters) {
+        parameters.append(py::make_tuple(each.name, each.initial, each.unit, to_string(each.range),
+                                         each.meaning));
+    }
+    for (const auto& each : system.state) {
+        state.append(py::make_tuple(each.title, each.start, each.unit, each.meaning));
+    }
+    for (const auto& each : system.known) known.append(described(each));
+    return py::dict(py::arg("name") = system.name, py::arg("type") = system.type,
+                    py::arg("description") = system.description, py::arg("source") = system.source,
+                    py::arg("equations") = system.equations, py::arg("parameters") = parameters,
+                    py::arg("state") = state, py::arg("modes") = of.modes, py::arg("known") = known,
+                    py::arg("constants") = system.constants);
+}
+
+/// One dictionary for each ready system.
+py::list described_systems()
+{
+    py::list all;
+    for (const ReadyDescription& each : ricochet::python::ready_descriptions()) {
+        all.append(described(each));
+    }
+    return all;
+}
+
+}  // namespace
+
 PYBIND11_MODULE(_ricochet, module)
 {
     using namespace ricochet::python;
@@ -54,10 +99,12 @@ PYBIND11_MODULE(_ricochet, module)
     module.def("ready_system", [](const std::string& name, const std::vector<double>& parameters) {
         return ready_system(name, parameters);
     });
-    module.def("closed_form", [](const Source& system, const std::string& what,
-                                 const std::vector<double>& arguments) {
-        return closed_form(system, what, arguments);
-    });
+    module.def("closed_form",
+               [](const std::string& system, const std::string& function,
+                  const std::vector<double>& parameters, const std::vector<double>& arguments) {
+                   return closed_form(system, function, parameters, arguments);
+               });
+    module.def("ready_descriptions", &described_systems);
     using ricochet::Times;
     py::class_<Times>(module, "Times",
                       "Times of events: a list in any order, in which a time may be there twice. "

@@ -14,12 +14,7 @@
 
 #include "implicit.hpp"
 #include "ricochet/simulation.hpp"
-#include "ricochet/systems/bouncing_ball.hpp"
-#include "ricochet/systems/coulomb_oscillator.hpp"
-#include "ricochet/systems/impact_oscillator.hpp"
-#include "ricochet/systems/pendulum.hpp"
-#include "ricochet/systems/stick_slip.hpp"
-#include "ricochet/systems/thermostat.hpp"
+#include "ricochet/systems/ready.hpp"
 #include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::python {
@@ -110,9 +105,7 @@ class ReadySource final : public Source {
                                       FrictionOscillator, System>;
 
 public:
-    explicit ReadySource(const typename System::Parameters& parameters) : system_(parameters) {}
-
-    [[nodiscard]] const System& system() const noexcept { return system_; }
+    explicit ReadySource(const System& system) : system_(system) {}
 
     [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override
     {
@@ -159,7 +152,7 @@ public:
         std::vector<std::string> names;
         for (std::size_t i = 0; i < guard_count_of<X>(system_); ++i) {
             const std::string_view name = guard_info_of<X>(system_, i).name;
-            names.emplace_back(name.empty() ? "floor" : name);
+            names.emplace_back(name.empty() ? System::descriptor().guard_name : name);
         }
         return names;
     }
@@ -183,77 +176,75 @@ private:
     System system_;
 };
 
-template <class System, std::size_t... i>
-typename System::Parameters parameters_from(std::span<const double> values,
-                                            std::index_sequence<i...>)
-{
-    return {values[i]...};
-}
-
-template <class System, std::size_t count>
-std::shared_ptr<Source> made(std::span<const double> values)
-{
-    static_assert(sizeof(typename System::Parameters) == count * sizeof(double));
-    if (values.size() != count) {
-        throw std::invalid_argument(std::string(System::name) + ": found " +
-                                    std::to_string(values.size()) + " parameters, expected " +
-                                    std::to_string(count));
-    }
-    return std::make_shared<ReadySource<System>>(
-        parameters_from<System>(values, std::make_index_sequence<count>{}));
-}
-
-template <class System>
-const System* as(const Source& source)
-{
-    const auto* ready = dynamic_cast<const ReadySource<System>*>(&source);
-    return ready ? &ready->system() : nullptr;
-}
-
 }  // namespace
 
 std::shared_ptr<Source> ready_system(std::string_view name, std::span<const double> parameters)
 {
-    if (name == BouncingBall::name) return made<BouncingBall, 2>(parameters);
-    if (name == Pendulum::name) return made<Pendulum, 2>(parameters);
-    if (name == ImpactOscillator::name) return made<ImpactOscillator, 4>(parameters);
-    if (name == CoulombOscillator::name) return made<CoulombOscillator, 4>(parameters);
-    if (name == StickSlip::name) return made<StickSlip, 5>(parameters);
-    if (name == Thermostat::name) return made<Thermostat, 5>(parameters);
+    std::shared_ptr<Source> made;
+    ReadySystems::for_each([&]<class System>() {
+        if (name != System::name) return;
+        made = std::make_shared<ReadySource<System>>(with_parameters<System>(parameters));
+    });
+    if (made) return made;
     throw std::invalid_argument("ready_system: found no system '" + std::string(name) + "'");
 }
 
-std::vector<double> closed_form(const Source& system, std::string_view what,
+namespace {
+
+const KnownFunction& known_function(std::string_view system, std::string_view function)
+{
+    for (const ReadyDescription& each : ready_descriptions()) {
+        if (each.system->name != system) continue;
+        for (const KnownFunction& known : each.system->known) {
+            if (known.name == function) return known;
+        }
+    }
+    throw std::invalid_argument("closed_form: found no function '" + std::string(function) + "'");
+}
+
+void check_argument(std::string_view function, const KnownFunction::Argument& argument,
+                    double given)
+{
+    const std::string found = std::string(function) + ": found " + std::string(argument.name) +
+                              " = " + std::to_string(given);
+    if (!std::isfinite(given)) throw std::invalid_argument(found + ", expected a finite number");
+    const bool whole =
+        given >= 0 && given <= std::numeric_limits<int>::max() && given == std::floor(given);
+    if (!argument.whole || whole) return;
+    throw std::invalid_argument(found + ", expected a whole number that is not negative");
+}
+
+}  // namespace
+
+std::vector<double> closed_form(std::string_view system, std::string_view function,
+                                std::span<const double> parameters,
                                 std::span<const double> arguments)
 {
-    for (const double argument : arguments) {
-        if (std::isfinite(argument)) continue;
-        throw std::invalid_argument(std::string(what) + ": found " + std::to_string(argument) +
-                                    ", expected finite numbers");
+    const KnownFunction& known = known_function(system, function);
+    if (arguments.size() != known.arguments.size()) {
+        throw std::invalid_argument(std::string(function) + ": found " +
+                                    std::to_string(arguments.size()) + " arguments, expected " +
+                                    std::to_string(known.arguments.size()));
     }
-    const auto argument = [&](std::size_t i) { return i < arguments.size() ? arguments[i] : 0; };
-    const auto count = [&](std::size_t i) {
-        const double n = argument(i);
-        if (n >= 0 && n <= std::numeric_limits<int>::max() && n == std::floor(n)) {
-            return static_cast<int>(n);
+    for (std::size_t i = 0; i < arguments.size(); ++i) {
+        check_argument(function, known.arguments[i], arguments[i]);
+    }
+    return known.values(parameters, arguments);
+}
+
+std::vector<ReadyDescription> ready_descriptions()
+{
+    std::vector<ReadyDescription> all;
+    ReadySystems::for_each([&]<class System>() {
+        ReadyDescription description{&System::descriptor(), {}};
+        if constexpr (requires { System::mode_count; }) {
+            for (Mode mode = 0; mode < System::mode_count; ++mode) {
+                description.modes.emplace_back(System::mode_name(mode));
+            }
         }
-        throw std::invalid_argument(std::string(what) + ": found n = " + std::to_string(n) +
-                                    ", expected a whole number that is not negative");
-    };
-    if (const auto* ball = as<BouncingBall>(system)) {
-        if (what == "impact_time") return {ball->impact_time(count(0), argument(1), argument(2))};
-        if (what == "zeno_time") return {ball->zeno_time(argument(0), argument(1))};
-    } else if (const auto* pendulum = as<Pendulum>(system)) {
-        if (what == "half_period") return {pendulum->half_period(argument(0))};
-    } else if (const auto* oscillator = as<ImpactOscillator>(system)) {
-        if (what == "impacts") return oscillator->impacts(argument(0));
-    } else if (const auto* coulomb = as<CoulombOscillator>(system)) {
-        if (what == "turning_time") return {coulomb->turning_time(count(0))};
-        if (what == "turning_point") return {coulomb->turning_point(count(0), argument(1))};
-    } else if (const auto* thermostat = as<Thermostat>(system)) {
-        if (what == "switch_time") return {thermostat->switch_time(count(0), argument(1))};
-    }
-    throw std::invalid_argument("closed_form: found no function '" + std::string(what) + "'");
+        all.push_back(std::move(description));
+    });
+    return all;
 }
 
 }  // namespace ricochet::python

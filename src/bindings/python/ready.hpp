@@ -3,9 +3,11 @@
 
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "ricochet/systems/descriptor.hpp"
 #include "source.hpp"
 
 namespace ricochet::python {
@@ -15,9 +17,17 @@ namespace ricochet::python {
 [[nodiscard]] std::shared_ptr<Source> ready_system(std::string_view name,
                                                    std::span<const double> parameters);
 
-/// Closed-form result of the system, by the name of its function in C++.
-/// @throws std::invalid_argument for an unknown name.
-[[nodiscard]] std::vector<double> closed_form(const Source& system, std::string_view what,
+/// A function of the known motion of a ready system.
+/// @throws std::invalid_argument for an unknown name, and arguments that do not fit.
+[[nodiscard]] std::vector<double> closed_form(std::string_view system, std::string_view function,
+                                              std::span<const double> parameters,
                                               std::span<const double> arguments);
+
+/// What a ready system says of itself, and the names of its modes, if it has several.
+struct ReadyDescription {
+    const SystemDescriptor* system;
+    std::vector<std::string> modes;
+};
+[[nodiscard]] std::vector<ReadyDescription> ready_descriptions();
 
 }  // namespace ricochet::python

@@ -259,8 +259,8 @@ private:
 template <class System, class Stepping,
           int N = solver_components<state_size<System>, reaction_size<System>>,
           int M = solver_reactions<state_size<System>, reaction_size<System>>>
-using RunOfInclusion = std::conditional_t<Branching<System> || HasStaticBound<System>,
-                                          RunInBranches<System, Stepping, N, M>,
-                                          RunBySteps<System, N, M>>;
+using RunOfInclusion =
+    std::conditional_t<Branching<System> || HasStaticBound<System>,
+                       RunInBranches<System, Stepping, N, M>, RunBySteps<System, N, M>>;
 
 }  // namespace ricochet::detail
