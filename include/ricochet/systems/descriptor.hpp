@@ -49,7 +49,7 @@ struct ComponentInfo {
 
 /// A function of the known motion.
 struct KnownFunction {
-    /// What the function takes.
+    /// An argument of the function.
     struct Argument {
         std::string_view name;
         std::optional<double> initial{};  ///< nothing: it has to be given
