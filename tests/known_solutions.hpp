@@ -22,7 +22,9 @@
 #include "ricochet/extremum.hpp"
 #include "ricochet/integrate.hpp"
 #include "ricochet/methods.hpp"
+#include "ricochet/systems/buck_converter.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
+#include "ricochet/systems/descriptor.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
 #include "ricochet/systems/pendulum.hpp"
 #include "ricochet/systems/stick_slip.hpp"
@@ -155,6 +157,20 @@ template <class Function>
     });
 }
 
+/// The converter is switched off and on in turn.
+[[nodiscard]] inline std::vector<Happening> converter_switches(double t_end)
+{
+    const SystemDescriptor& of = BuckConverter::descriptor();
+    std::vector<double> parameters;
+    for (const ParameterInfo& each : of.parameters) parameters.push_back(each.initial);
+    std::vector<Happening> out;
+    for (const double t : of.event_times(parameters, BuckConverter::start, t_end)) {
+        const bool off = out.size() % 2 == 0;
+        out.push_back({.t = t, .guard = off ? BuckConverter::at_high : BuckConverter::at_low});
+    }
+    return out;
+}
+
 /// Every ready system with its default problem.
 [[nodiscard]] inline std::vector<KnownSolution> known_solutions()
 {
@@ -253,6 +269,14 @@ template <class Function>
                    .mode = StickSlip::slip_left,
                    .run = runs(StickSlip())});
     all.back().options.mode = StickSlip::start_mode;
+    all.push_back(
+        {.name = "buck_converter",
+         .start = as_vector(BuckConverter::start),
+         .options = tight(0.003),
+         .events = converter_switches(0.003),
+         .mode = converter_switches(0.003).size() % 2 == 0 ? BuckConverter::on : BuckConverter::off,
+         .run = runs(BuckConverter())});
+    all.back().options.mode = BuckConverter::start_mode;
     all.push_back({.name = "detest_f1",
                    .start = as_vector(DetestF1::start),
                    .options = tight(DetestF1::t_end),

@@ -2,7 +2,7 @@
 from typing import Optional, Tuple
 
 __all__ = ["Ready", "BouncingBall", "Pendulum", "Thermostat", "ImpactOscillator",
-           "CoulombOscillator", "StickSlip"]
+           "CoulombOscillator", "StickSlip", "BuckConverter"]
 
 class Ready:
     modes: Optional[Tuple[str, ...]]
@@ -46,3 +46,9 @@ class StickSlip(Ready):
     period: float
     def __init__(self, *, mass: float = 1.0, stiffness: float = 1.0, belt_speed: float = 0.2,
                  friction: float = 1.0, weakening: float = 3.0) -> None: ...
+
+class BuckConverter(Ready):
+    start: Tuple[float, float]
+    def __init__(self, *, input: float = 12.0, inductance: float = 0.001,
+                 capacitance: float = 0.0001, resistance: float = 10.0, low: float = 0.4,
+                 high: float = 0.6) -> None: ...

@@ -15,14 +15,14 @@
 namespace ricochet::systems_test {
 namespace {
 
-const Words with_guards{"pendulum",           "henon-heiles", "three-body", "hidden-pair",
-                        "near-tangent",       "thermostat",   "grow-decay", "impact-oscillator",
-                        "coulomb-oscillator", "stick-slip"};
+const Words with_guards{"pendulum",           "henon-heiles", "three-body",    "hidden-pair",
+                        "near-tangent",       "thermostat",   "grow-decay",    "impact-oscillator",
+                        "coulomb-oscillator", "stick-slip",   "buck-converter"};
 const Words with_time_events{"detest-f1", "detest-f2", "detest-f3", "detest-f4", "detest-f5"};
 const Words with_series{"bouncing-ball",     "pendulum",           "henon-heiles", "three-body",
                         "hidden-pair",       "near-tangent",       "thermostat",   "grow-decay",
-                        "impact-oscillator", "coulomb-oscillator", "stick-slip",   "detest-f1",
-                        "detest-f2",         "detest-f4"};
+                        "impact-oscillator", "coulomb-oscillator", "stick-slip",   "buck-converter",
+                        "detest-f1",         "detest-f2",          "detest-f4"};
 
 TEST_F(App, ThePageOfSystemsIsWhatTheCommandPrints)
 {

@@ -17,6 +17,7 @@
 #include "clustered_systems.hpp"
 #include "known_solutions.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
+#include "ricochet/systems/buck_converter.hpp"
 
 namespace ricochet::systems_test {
 namespace {
@@ -759,6 +760,12 @@ TEST(Parameters, OutsideTheirRangeAreRefusedByName)
                    {"static_friction", "at least friction 0.4", "0.3"});
     expect_refused([] { StickSlip({.belt_speed = inf}); }, {"StickSlip", "belt_speed", "inf"});
     expect_refused([] { StickSlip({.weakening = -3}); }, {"StickSlip", "weakening", "-3"});
+    expect_refused([] { BuckConverter({.inductance = 0}); }, {"BuckConverter", "inductance"});
+    expect_refused([] { BuckConverter({.capacitance = nan}); }, {"capacitance", "nan"});
+    expect_refused([] { BuckConverter({.resistance = -1}); }, {"resistance", "positive", "-1"});
+    expect_refused([] { BuckConverter({.low = 0}); }, {"low", "positive"});
+    expect_refused([] { BuckConverter({.high = 0.3}); }, {"high", "above low 0.4", "0.3"});
+    expect_refused([] { BuckConverter({.input = 5}); }, {"input", "above resistance * high 6"});
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "ricochet/systems/bouncing_ball.hpp"
+#include "ricochet/systems/buck_converter.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
 #include "ricochet/systems/descriptor.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
@@ -23,7 +24,7 @@ struct SystemList {
 };
 
 /// In the order of the lists.
-using ReadySystems =
-    SystemList<BouncingBall, Pendulum, Thermostat, ImpactOscillator, CoulombOscillator, StickSlip>;
+using ReadySystems = SystemList<BouncingBall, Pendulum, Thermostat, ImpactOscillator,
+                                CoulombOscillator, StickSlip, BuckConverter>;
 
 }  // namespace ricochet

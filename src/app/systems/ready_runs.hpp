@@ -55,6 +55,8 @@ struct ReadyRuns {
                 const auto x = start(p);
                 return system(p).mode_at(x[0], x[1]);
             };
+        } else if constexpr (requires { System::start_mode; }) {
+            entry.start_mode = [](const Numbers&) { return System::start_mode; };
         }
     }
 };
