@@ -37,13 +37,9 @@ function(ricochet_add_fmu target)
         RICOCHET_FMU_IDENTIFIER="${target}"
         RICOCHET_FMU_MODEL_EXCHANGE=${me}
         RICOCHET_FMU_CO_SIMULATION=${cs})
-    file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/${target}.map
-        "{ global: fmi2*; fmi3*; ricochet_fmu_description; local: *; };\n")
     target_link_libraries(${target} PRIVATE
         "$<LINK_LIBRARY:WHOLE_ARCHIVE,ricochet::fmi_export>" ${arg_LINK} ricochet::ricochet)
-    target_link_options(${target} PRIVATE -static-libstdc++ -static-libgcc
-        LINKER:--as-needed LINKER:--no-undefined LINKER:--gc-sections LINKER:--strip-all
-        LINKER:--version-script=${CMAKE_CURRENT_BINARY_DIR}/${target}.map)
+    ricochet_fmu_link_options(${target})
     set(platform2 linux64)
     set(platform3 ${CMAKE_SYSTEM_PROCESSOR}-linux)
     set(ending2 -2)
@@ -64,4 +60,12 @@ function(ricochet_add_fmu target)
                 modelDescription.xml binaries
             VERBATIM)
     endforeach()
+endfunction()
+
+function(ricochet_fmu_link_options target)
+    file(WRITE ${CMAKE_CURRENT_BINARY_DIR}/${target}.map
+        "{ global: fmi2*; fmi3*; ricochet_fmu_description*; local: *; };\n")
+    target_link_options(${target} PRIVATE -static-libstdc++ -static-libgcc
+        LINKER:--as-needed LINKER:--no-undefined LINKER:--gc-sections LINKER:--strip-all
+        LINKER:--version-script=${CMAKE_CURRENT_BINARY_DIR}/${target}.map)
 endfunction()

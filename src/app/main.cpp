@@ -80,7 +80,7 @@ void add_commands(CLI::App& app, int& status)
     add_program(app, programs[2].name, programs[2].meaning);
     add_compare(app, status, compare_here_or_there);
     add_program(app, "explain", "Say how a scene would be run: ricochet explain SCENE.json");
-    add_program(app, "fmu", "Say what an FMU is: ricochet fmu MODEL.fmu");
+    add_program(app, "fmu", "Say what an FMU is: ricochet fmu MODEL.fmu; or export a ready system");
 }
 
 /// Whether the command is about a file with that ending: `simulate FILE`, or the command `other`.

@@ -1,6 +1,7 @@
 // `ricochet simulate MODEL.fmu` and `ricochet fmu MODEL.fmu`.
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <string>
 
 #include "../fmi/probes.hpp"
@@ -60,6 +61,30 @@ TEST_F(FmuApp, AnFmuIsDescribed)
         << text.out;
     EXPECT_NE(text.out.find("height = 10 m: above the floor"), std::string::npos) << text.out;
     EXPECT_EQ(json({"fmu", ball, "--json"}).at("states").at(0), "height");
+}
+
+TEST_F(FmuApp, AReadySystemIsExportedAndRuns)
+{
+    const Result made =
+        run({"fmu", "export", "thermostat", "--set", "low=19", "--fmi", "2", "-o", "room.fmu"});
+    ASSERT_EQ(made.status, 0) << made.err;
+    const auto room = json({"fmu", "room.fmu", "--json"});
+    EXPECT_EQ(room.at("fmi"), "2.0");
+    const auto there = json({"simulate", "room.fmu", "--json", "--rtol", "1e-12"}).at("events");
+    const auto here = json({"simulate", "thermostat", "--set", "low=19", "--json"}).at("events");
+    ASSERT_EQ(there.size(), here.size());
+    for (std::size_t i = 0; i < here.size(); ++i) {
+        // The tolerance of the run here, 1e-10 of 22 degrees at a degree a second.
+        EXPECT_NEAR(there[i].at("t").get<double>(), here[i].at("t").get<double>(), 1e-7);
+    }
+    for (const Words& words : {Words{"fmu", "export", "thermostat"},
+                               {"fmu", "export", "thermostats", "-o", "x.fmu"},
+                               {"fmu", "export", "thermostat", "--set", "low=23", "-o", "x.fmu"},
+                               {"fmu", "room.fmu", "-o", "x.fmu"},
+                               {"fmu", "export", "thermostat", "--fmi", "1", "-o", "x.fmu"}}) {
+        EXPECT_EQ(run(words).status, 2);
+        EXPECT_FALSE(std::filesystem::exists(work() / "x.fmu"));
+    }
 }
 
 TEST_F(FmuApp, WhatDoesNotFitIsBadInput)

@@ -27,7 +27,8 @@
 //     get_outputs(const System&, Mode, double t, const State&,
 //                                                                             std::span<double>
 //                                                                             outputs)
-//     static constexpr Mode mode                 at the start
+//     static constexpr Mode mode                 at the start; or, by the state there,
+//     static Mode mode_at(const System&, const State&)
 //     using State                                else that of the system
 //     using Method                               else Dopri5; for co-simulation
 //     static constexpr double rtol, t_end        1e-10 and 10 s; for co-simulation, of the default
@@ -40,11 +41,13 @@
 #pragma once
 
 #include <algorithm>
+#include <concepts>
 #include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -158,6 +161,13 @@ public:
     void start() override
     {
         make_system();
+        if constexpr (requires(const System& system, const X& at) {
+                          {
+                              Model::mode_at(system, at)
+                              } -> std::convertible_to<Mode>;
+                      }) {
+            mode = Model::mode_at(*system_, state());
+        }
         run_.reset();
         waits_ = false;
         if constexpr (exchanges) {
@@ -390,7 +400,7 @@ private:
 /// come from `ricochet_add_fmu`.
 #define RICOCHET_FMU(Model)                                                                     \
     std::unique_ptr<ricochet::fmi::detail::ExportedModel>                                       \
-    ricochet::fmi::detail::make_exported_model()                                                \
+    ricochet::fmi::detail::make_exported_model(std::string_view)                                \
     {                                                                                           \
         return std::make_unique<ExportedOf<Model>>(ExportedOf<Model>::facts_of(                 \
             RICOCHET_FMU_IDENTIFIER, RICOCHET_FMU_MODEL_EXCHANGE, RICOCHET_FMU_CO_SIMULATION)); \

@@ -14,6 +14,7 @@
 #include "base/read_file.hpp"
 #include "fmu_report.hpp"
 #include "isolated.hpp"
+#include "ricochet/fmi/ready.hpp"
 
 namespace ricochet::app {
 
@@ -174,14 +175,36 @@ int check_fmu(const FmuRequest& request, const fmi::Fmu& fmu)
     return std::ranges::any_of(findings, &fmi::Finding::fault) ? 1 : 0;
 }
 
+int export_fmu(const FmuRequest& request)
+{
+    if (!request.out) throw BadInput("fmu export: found no --out; expected a file");
+    fmi::ReadyFmu wanted{.system = request.words[1], .version = static_cast<int>(request.version)};
+    for (const std::string& text : request.set) {
+        const Assignment one = assignment("--set", text);
+        wanted.set.emplace_back(one.name, one.value);
+    }
+    Claims claims;
+    claims.writes("--out", *request.out);
+    try {
+        export_ready(wanted, *request.out);
+    } catch (const fmi::Error& error) {
+        throw BadInput(error.what());
+    }
+    return 0;
+}
+
 }  // namespace
 
 int describe_fmu(const FmuRequest& request)
 {
+    if (request.words.size() == 2 && request.words[0] == "export") return export_fmu(request);
+    if (request.out || !request.set.empty()) {
+        throw BadInput("fmu: found --out or --set, which are for export");
+    }
     const bool checks = request.words.size() == 2;
     if (checks && request.words[0] != "check") {
-        throw BadInput(
-            fmt::format("found '{}' before the FMU; expected check, or nothing", request.words[0]));
+        throw BadInput(fmt::format("found '{}' before the FMU; expected check, export or nothing",
+                                   request.words[0]));
     }
     const fmi::Fmu fmu = open_fmu(request.words.back());
     if (checks) return check_fmu(request, fmu);

@@ -58,13 +58,21 @@ void add_describe_fmu(CLI::App& app, int& status)
     auto request = std::make_shared<FmuRequest>();
     command
         .add_option("MODEL", request->words,
-                    "a file that ends in .fmu; before it `check`, to look "
-                    "for faults of its library")
+                    "a file that ends in .fmu; before it `check`, to look for faults of its "
+                    "library; or `export` and the name of a ready system")
         ->required()
         ->expected(1, 2)
         ->type_name("");
     command.add_flag("--json", request->json, "print JSON");
-    command.footer("Examples:\n  ricochet fmu ball.fmu\n  ricochet fmu check ball.fmu");
+    add_text(command, "--out,-o", request->out, "FILE", "the FMU that `export` writes");
+    command.add_option("--set", request->set, "a parameter or start value of `export`")
+        ->type_name("name=value ...");
+    command.add_option("--fmi", request->version, "version of FMI of `export`, default 3")
+        ->check(CLI::IsMember({2, 3}))
+        ->type_name("2|3");
+    command.footer(
+        "Examples:\n  ricochet fmu ball.fmu\n  ricochet fmu check ball.fmu\n"
+        "  ricochet fmu export bouncing-ball --set restitution=0.8 -o ball.fmu");
     command.callback([&status, request] { status = describe_fmu(*request); });
 }
 

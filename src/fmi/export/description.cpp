@@ -309,8 +309,15 @@ std::string token(const ModelFacts& facts, int version)
     const std::string text = Writer(facts, version, "").write();
     const std::uint64_t high = hash(text, 0xcbf29ce484222325U);
     const std::uint64_t low = hash(text, high);
-    return fmt::format("{{{:08x}-{:04x}-{:04x}-{:04x}-{:012x}}}", high >> 32, high >> 16 & 0xffff,
-                       high & 0xffff, low >> 48, low & 0xffffffffffff);
+    return fmt::format("{{{:08x}-{:04x}-{:04x}-{:04x}-{:012x}}}{}{}", high >> 32,
+                       high >> 16 & 0xffff, high & 0xffff, low >> 48, low & 0xffffffffffff,
+                       facts.told.empty() ? "" : " ", facts.told);
+}
+
+std::string_view told_by(std::string_view token) noexcept
+{
+    const std::size_t space = token.find(' ');
+    return space < token.size() ? token.substr(space + 1) : std::string_view();
 }
 
 std::string description(const ModelFacts& facts, int version)

@@ -58,8 +58,8 @@ Saved parse(std::string_view text)
 
 }  // namespace
 
-Instance::Instance(bool me, bool events)
-    : model_exchange(me), event_mode(events), model(make_exported_model())
+Instance::Instance(bool me, bool events, std::string_view told)
+    : model_exchange(me), event_mode(events), model(make_exported_model(told))
 {
 }
 
@@ -166,18 +166,19 @@ Instance* make_instance(int version, bool model_exchange, bool event_mode, const
                         Log3 log3) noexcept
 {
     try {
-        auto made = std::make_unique<Instance>(model_exchange, event_mode);
+        const std::string_view given(given_token != nullptr ? given_token : "");
+        auto made = std::make_unique<Instance>(model_exchange, event_mode, told_by(given));
         made->environment = environment;
         made->log2 = log2;
         made->log3 = log3;
         made->name = name != nullptr ? name : "";
         const ModelFacts& facts = made->model->facts();
         const std::string expected = token(facts, version);
-        if (given_token == nullptr || expected != given_token) {
+        if (given != expected) {
             made->fail(
                 fmt::format("the description is of another model: found the token '{}', "
                             "expected '{}'",
-                            given_token != nullptr ? given_token : "", expected));
+                            given, expected));
             return nullptr;
         }
         if (!(model_exchange ? facts.model_exchange : facts.co_simulation)) {
@@ -220,7 +221,7 @@ int reset_instance(void* handle)
 {
     Instance& instance = instance_of(handle);
     return instance.attempt([&] {
-        instance.model = make_exported_model();
+        instance.model = make_exported_model(instance.model->facts().told);
         instance.stage = Stage::instantiated;
         instance.event_waits = false;
     });

@@ -23,7 +23,8 @@ enum class Stage : std::uint8_t {
 
 class Instance {
 public:
-    Instance(bool model_exchange, bool event_mode);
+    /// @param told  see `ModelFacts`
+    Instance(bool model_exchange, bool event_mode, std::string_view told);
 
     using Log2 = void (*)(void*, const char*, int, const char*, const char*, ...);
 

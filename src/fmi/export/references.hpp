@@ -37,5 +37,7 @@ struct Place {
 [[nodiscard]] std::string description(const ModelFacts& facts, int version);
 /// Hash of the description without it, as a GUID in braces.
 [[nodiscard]] std::string token(const ModelFacts& facts, int version);
+/// What a token tells of the model.
+[[nodiscard]] std::string_view told_by(std::string_view token) noexcept;
 
 }  // namespace ricochet::fmi::detail

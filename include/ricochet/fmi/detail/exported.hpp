@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "ricochet/fmi/variable.hpp"
@@ -26,6 +27,8 @@ struct ModelFacts {
     bool model_exchange = false;  ///< is offered
     bool co_simulation = false;
     double t_end = 1;  ///< [s] of the default experiment
+    /// What the library is told of the model by the end of the token, where it has several.
+    std::string told{};
 };
 
 /// What a round of event iteration ended with.
@@ -85,7 +88,8 @@ private:
     ModelFacts facts_;
 };
 
-/// Defined by RICOCHET_FMU.
-[[nodiscard]] std::unique_ptr<ExportedModel> make_exported_model();
+/// Defined by RICOCHET_FMU. @param told  see `ModelFacts`
+/// @throws std::invalid_argument if the library has no such model
+[[nodiscard]] std::unique_ptr<ExportedModel> make_exported_model(std::string_view told);
 
 }  // namespace ricochet::fmi::detail

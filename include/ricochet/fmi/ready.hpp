@@ -1,0 +1,27 @@
+// The ready systems as FMUs, without a compiler.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace ricochet::fmi {
+
+/// A ready system, its values, and the version of its FMU.
+struct ReadyFmu {
+    std::string_view system;  ///< its name, "bouncing-ball"
+    /// Values of parameters, and of components at the start by their titles, in place of those of
+    /// the descriptor; with hyphens or underscores.
+    std::vector<std::pair<std::string, double>> set{};
+    int version = 3;  ///< of FMI: 2 or 3
+};
+
+/// Writes an FMU for model exchange and co-simulation: a copy of a library that has all ready
+/// systems, and a description. Its start values are those of `set`.
+/// @throws fmi::Error with a sentence: for an unknown system or name, for values out of range, and
+/// where the library is not installed or the file cannot be written
+void export_ready(const ReadyFmu& wanted, const std::filesystem::path& file);
+
+}  // namespace ricochet::fmi
