@@ -68,7 +68,7 @@ class Fmu:
 
     def simulate(self, t_end=None, t_start=None, *, rtol=1e-8, method="automatic", h_max=math.inf,
                  start=None, inputs=None, output=None, sample_times=None, samples=501, step=None,
-                 co_simulation=None):
+                 co_simulation=None, watch=None):
         """Run the model; every event is located to neighbouring floating-point numbers.
 
         Parameters
@@ -94,6 +94,11 @@ class Fmu:
             Length [s] of the steps of co-simulation.
         co_simulation
             Whether the FMU integrates itself; default: where it offers nothing else.
+        watch
+            Dictionary from names to levels, or to pairs of a level and a direction (-1 falling, 1
+            rising, 0 either): passages are located by steps that are taken again, and are events
+            with the cause ``"passage"`` and the name in ``watch``. For FMUs that keep their state;
+            the run is one of co-simulation.
 
         Returns
         -------
@@ -104,15 +109,18 @@ class Fmu:
         if sample_times is None:
             sample_times = np.linspace(begin, end, samples)
         tables, functions = _tables_and_functions(inputs or {})
+        watched = [(name, *(float(part) for part in np.atleast_1d(level)), 0)[:3]
+                   for name, level in (watch or {}).items()]
         given = {"t_start": begin, "t_end": end, "rtol": float(rtol), "method": method,
                  "h_max": float(h_max), "step": None if step is None else float(step),
-                 "co_simulation": co_simulation,
+                 "co_simulation": True if watched else co_simulation,
+                 "watch": [(name, level, int(crossing)) for name, level, crossing in watched],
                  "start": [(name, float(value)) for name, value in
                            {**self.parameters, **(start or {})}.items()],
                  "output": list(output or []),
                  "sample_times": np.asarray(sample_times, dtype=float).tolist(),
                  "tables": tables, "functions": functions}
-        return FmuRun(self._fmu.run(given))
+        return FmuRun(self._fmu.run(given), [name for name, *_ in watched])
 
 
 def _tables_and_functions(inputs):
@@ -170,8 +178,9 @@ class FmuRun:
     sides
         Shape (n,): -1 before an event, 1 after it, else 0.
     events
-        List of namespaces with ``t`` [s], ``causes`` (of ``"state"``, ``"time"``, ``"step"`` and
-        ``"input"``), ``indicator``, and the states ``before`` and ``after``.
+        List of namespaces with ``t`` [s], ``causes`` (of ``"state"``, ``"time"``, ``"step"``,
+        ``"input"`` and ``"passage"``), ``indicator``, ``watch``, and the states ``before`` and
+        ``after``.
     outcome, message, success
         ``"reached_end"``, ``"terminated"``, ``"chattering"``, ``"call_failed"`` or
         ``"not_integrated"``; a sentence; whether the run reached its end or the FMU asked for it.
@@ -181,15 +190,16 @@ class FmuRun:
         The method that was used; counts of steps and calls; sentences.
     """
 
-    def __init__(self, told):
+    def __init__(self, told, watched=()):
         self.outcome, self.message = told["outcome"], told["message"]
         self.success = self.outcome in ("reached_end", "terminated")
         self.t_end, self.x = told["t_end"], np.asarray(told["x"])
         self.t, self.sides, self.method = told["t"], told["sides"], told["method"]
         self.statistics = SimpleNamespace(**told["statistics"])
         self.warnings = told["warnings"]
-        self.events = [SimpleNamespace(t=t, causes=causes, indicator=indicator, before=before, after=after)
-                       for t, causes, indicator, before, after in told["events"]]
+        self.events = [SimpleNamespace(t=t, causes=causes, watch=None if watch is None else watched[watch],
+                                       indicator=indicator, before=before, after=after)
+                       for t, causes, watch, indicator, before, after in told["events"]]
         self._values = dict(zip(told["output"], told["values"].T))
 
     def __getitem__(self, name):

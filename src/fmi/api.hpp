@@ -101,6 +101,9 @@ struct Functions {
     int (*derivatives)(Handle, double*, std::size_t);
     int (*indicators)(Handle, double*, std::size_t);
     int (*terminate)(Handle);
+    int (*keep_state)(Handle, void**);
+    int (*set_kept_state)(Handle, void*);
+    int (*free_state)(Handle, void**);
     void (*free)(Handle);
 };
 

@@ -71,6 +71,7 @@ Instance::Instance(std::shared_ptr<const Unpacked> unpacked, Kind kind)
 Instance::~Instance()
 {
     if (handle_ == nullptr || stage_ == Stage::lost) return;
+    if (kept_ != nullptr) f_.free_state(handle_, &kept_);
     if (stage_ == Stage::initialized) f_.terminate(handle_);
     f_.free(handle_);
 }
@@ -451,7 +452,7 @@ Stepped Instance::step(double t, double h)
     ++calls.steps;
     Stepped stepped{.t = t + h};
     if (description().version == 2) {
-        const int status = f_.step2(handle_, t, h, 1);
+        const int status = f_.step2(handle_, t, h, kept_ == nullptr ? 1 : 0);
         if (status != status_discard) {
             check(status, "DoStep");
             return stepped;
@@ -467,10 +468,21 @@ Stepped Instance::step(double t, double h)
         return stepped;
     }
     bool early = false;
-    check(f_.step3(handle_, t, h, true, &stepped.event, &stepped.terminate, &early, &stepped.t),
+    check(f_.step3(handle_, t, h, kept_ == nullptr, &stepped.event, &stepped.terminate, &early,
+                   &stepped.t),
           "DoStep");
     if (!early && !stepped.terminate) stepped.t = t + h;
     return stepped;
+}
+
+void Instance::keep_state()
+{
+    check(f_.keep_state(handle_, &kept_), "GetFMUState");
+}
+
+void Instance::go_back_to_kept_state()
+{
+    check(f_.set_kept_state(handle_, kept_), "SetFMUState");
 }
 
 void Instance::enter_step_mode()

@@ -70,6 +70,9 @@ public:
     // --- co-simulation ---
 
     [[nodiscard]] Stepped step(double t, double h);
+    /// Keeps the present state, in place of one that was kept before.
+    void keep_state();
+    void go_back_to_kept_state();
     void enter_step_mode();
     [[nodiscard]] bool uses_event_mode() const noexcept { return event_mode_; }
 
@@ -110,6 +113,7 @@ private:
     Handle handle_ = nullptr;
     Stage stage_ = Stage::instantiated;
     bool event_mode_ = false;
+    void* kept_ = nullptr;  ///< state
     std::vector<std::string> messages_;
     std::vector<Reference> derivative_references_;
     std::vector<Element> state_elements_;

@@ -149,6 +149,12 @@ Library::Library(const std::filesystem::path& file, const Description& d, Kind k
         from.needed(functions.exit_initialization, "ExitInitializationMode");
         from.needed(functions.terminate, "Terminate");
         from.needed(functions.free, "FreeInstance");
+        if (interface.saves_state) {
+            const bool two = d.version == 2;
+            from.needed(functions.keep_state, two ? "GetFMUstate" : "GetFMUState");
+            from.needed(functions.set_kept_state, two ? "SetFMUstate" : "SetFMUState");
+            from.needed(functions.free_state, two ? "FreeFMUstate" : "FreeFMUState");
+        }
         d.version == 2 ? load2(from, functions, interface, kind)
                        : load3(from, functions, interface, kind);
     } catch (...) {

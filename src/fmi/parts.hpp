@@ -117,6 +117,24 @@ private:
     template <class Set>
     void handle(const Causes& causes, const Set& set);
 
+    /// A watched variable.
+    struct Watched {
+        Element element;
+        double side = 0;  ///< of the level: the last difference that was not zero
+    };
+
+    void resolve_watches();
+    /// The watched variable over its level.
+    [[nodiscard]] double above(std::size_t k);
+    void note_sides();
+    /// Whether a watched variable has passed its level, where it is over it by `to` now.
+    [[nodiscard]] bool passes(std::size_t k, double to) const;
+    /// Length of the step from the kept state that ends at the passage.
+    [[nodiscard]] double length_to_passage(std::size_t k, double h, double at_end);
+    /// Records the passages in the step from t, of which `asked` was asked, to `reached`.
+    void locate_passages(double asked, double reached);
+
+    std::vector<Watched> watches_;
     double step_ = 0;        ///< [s]
     std::size_t count_ = 0;  ///< of communication points reached
     double next_time_ = 0;   ///< [s] of the FMU's next time event

@@ -15,7 +15,14 @@ namespace {
 std::unique_ptr<Simulation::Parts> start(const Fmu& fmu, const Options& options)
 {
     const Description& d = fmu.description();
-    const bool co = options.co_simulation.value_or(!d.model_exchange && d.co_simulation);
+    const bool watches = !options.watch.empty();
+    const bool co =
+        options.co_simulation.value_or(watches || (!d.model_exchange && d.co_simulation));
+    if (watches && !co) {
+        throw Error(
+            fmt::format("{}: found a watch of '{}' in model exchange; expected co-simulation",
+                        d.file, options.watch.front().name));
+    }
     if (co) return std::make_unique<Steps>(fmu, options);
     return std::make_unique<Phases>(fmu, options);
 }
@@ -52,6 +59,7 @@ std::string describe(const Causes& causes)
     if (causes.time) names.emplace_back("time");
     if (causes.step) names.emplace_back("step");
     if (causes.input) names.emplace_back("input");
+    if (causes.passage) names.emplace_back("passage");
     return fmt::format("{}", fmt::join(names, " and "));
 }
 

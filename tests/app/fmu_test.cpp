@@ -63,6 +63,22 @@ TEST_F(FmuApp, AnFmuIsDescribed)
     EXPECT_EQ(json({"fmu", ball, "--json"}).at("states").at(0), "height");
 }
 
+TEST_F(FmuApp, APassageOfAWatchedVariableIsAnEvent)
+{
+    const Words words{"simulate", ball, "--watch", "height=2", "--step", "0.1", "--t-end", "2"};
+    const Result text = run(words);
+    EXPECT_EQ(text.status, 0) << text.err;
+    EXPECT_NE(text.out.find("passage (height = 2)"), std::string::npos) << text.out;
+    Words as_json = words;
+    as_json.push_back("--json");
+    const auto events = json(as_json).at("events");
+    ASSERT_GE(events.size(), 2U);
+    EXPECT_EQ(events[0].at("causes").at(0), "passage");
+    EXPECT_EQ(events[0].at("watch"), 0);
+    EXPECT_NEAR(events[0].at("t").get<double>(), std::sqrt(16 / 9.81), 1e-15);
+    EXPECT_EQ(run({"simulate", ball, "--watch", "depth=2"}).status, 2);
+}
+
 TEST_F(FmuApp, AReadySystemIsExportedAndRuns)
 {
     const Result made =

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "ricochet/fmi/run.hpp"
@@ -105,6 +106,84 @@ TEST_P(Exports, CoSimulationOfTheBallDoesNotDependOnTheSteps)
         EXPECT_NEAR(run.last("height"), expected, 4 * 1.8e-15 * 8.3) << step;
         EXPECT_EQ(run.last("events"), n + 1);
     }
+}
+
+/// Times at which the ball passes a height [m], up and down.
+std::vector<double> passages(const BouncingBall& ball, double height, double t_end)
+{
+    std::vector<double> out{std::sqrt(2 * (10 - height) / 9.81)};
+    double v = std::sqrt(2 * 9.81 * 10);
+    for (int n = 0; ball.impact_time(n, 10) < t_end; ++n) {
+        v *= 0.9;
+        const double square = v * v - 2 * 9.81 * height;
+        if (square < 0) break;
+        for (const double side : {-1, 1}) {
+            const double t = ball.impact_time(n, 10) + (v + side * std::sqrt(square)) / 9.81;
+            if (t <= t_end) out.push_back(t);
+        }
+    }
+    return out;
+}
+
+TEST_P(Exports, APassageOfAnOutputIsLocatedInCoSimulation)
+{
+    const BouncingBall ball({.gravity = 9.81, .restitution = 0.9});
+    const std::vector<double> expected = passages(ball, 2, 12);
+    ASSERT_EQ(expected.size(), 11U);
+    for (const double step : {0.01, 0.1, 0.37}) {
+        const Result run = fmi::run(exported("ball", GetParam()),
+                                    {.t_end = 12,
+                                     .output = {"height", "velocity"},
+                                     .step = step,
+                                     .watch = {{"height", 2}, {"velocity", 0, Crossing::falling}}});
+        ASSERT_EQ(run.end, End::reached_end) << describe(run);
+        std::vector<double> found;
+        std::size_t tops = 0;
+        for (const Event& event : run.events) {
+            if (!event.causes.passage) continue;
+            if (event.watch == 0) found.push_back(event.t);
+            tops += event.watch;
+        }
+        // To the doubles next to each other, at a speed of 4 m/s and more of a height that is
+        // rounded to 4e-16 m; the run inside has its own rounding of a few doubles of the time.
+        expect_times(found, expected, 1e-14);
+        std::size_t flights = 0;  // whose top is before the end
+        double v = 0.9 * std::sqrt(2 * 9.81 * 10);
+        while (ball.impact_time(static_cast<int>(flights), 10) + v / 9.81 < 12) {
+            ++flights;
+            v *= 0.9;
+        }
+        EXPECT_EQ(tops, flights) << step;
+        for (const Row& row : run.rows) {
+            if (row.t == found[3]) EXPECT_NEAR(row.values[0], 2, 1e-14);
+        }
+    }
+    // What is watched changes nothing.
+    const auto height = [&](std::vector<Watch> watch) {
+        return fmi::run(exported("ball", GetParam()), {.t_end = 12,
+                                                       .output = {"height"},
+                                                       .sample_times = {12},
+                                                       .step = 0.1,
+                                                       .co_simulation = true,
+                                                       .watch = std::move(watch)})
+            .last("height");
+    };
+    EXPECT_EQ(height({}), height({{"height", 2}}));
+}
+
+TEST_P(Exports, AWatchThatDoesNotFitIsRefusedByName)
+{
+    const auto refused = [&](const Options& options) -> std::string {
+        try {
+            (void)fmi::run(exported("ball", GetParam()), options);
+        } catch (const Error& error) {
+            return error.what();
+        }
+        return {};
+    };
+    EXPECT_NE(refused({.watch = {{"depth", 2}}}).find("'depth'"), std::string::npos);
+    EXPECT_NE(refused({.co_simulation = false, .watch = {{"height", 2}}}).find("co-simulation"),
+              std::string::npos);
 }
 
 TEST(ExportsOfVersion3, CoSimulationShowsTheStateBeforeTheEventUntilItIsHandled)

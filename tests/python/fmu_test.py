@@ -58,6 +58,20 @@ def test_co_simulation():
     np.testing.assert_allclose([event.t for event in run.events], expected, rtol=0, atol=1e-14)
 
 
+def test_a_watched_level_is_located_in_co_simulation():
+    ball = ricochet.load_fmu(f"{FMUS}/fmu_ball.fmu")
+    run = ball.simulate(t_end=3, step=0.1, watch={"height": (2, -1)})
+    passed = [event for event in run.events if event.watch == "height"]
+    # Falls through 2 m from 10 m, and after an impact at 0.9 of the speed.
+    first, speed = math.sqrt(20 / 9.81), 0.9 * math.sqrt(2 * 9.81 * 10)
+    expected = [math.sqrt(16 / 9.81), first + (speed + math.sqrt(speed**2 - 4 * 9.81)) / 9.81]
+    assert all(event.causes == ["passage"] for event in passed)
+    # To neighbouring doubles at a speed of 12 m/s of a height that is rounded to 4e-16 m.
+    np.testing.assert_allclose([event.t for event in passed], [t for t in expected if t < 3], rtol=0, atol=2e-15)
+    with pytest.raises(ValueError, match="'depth'"):
+        ball.simulate(watch={"depth": 2})
+
+
 def test_what_does_not_fit_is_named(tmp_path):
     (tmp_path / "m.fmu").write_text("no zip")
     with pytest.raises(ValueError, match="no zip archive"):

@@ -27,6 +27,7 @@
 #include <vector>
 
 #include "ricochet/fmi/fmu.hpp"
+#include "ricochet/guard.hpp"
 #include "ricochet/run.hpp"
 
 namespace ricochet::fmi {
@@ -55,6 +56,15 @@ struct Input {
     std::function<double(double t)> function{};  ///< instead of a table: smooth
 };
 
+/// A level of a variable whose passages a run by co-simulation locates: the FMU takes its step
+/// again and again from the kept state of its start, until it ends at the passage. A variable that
+/// passes the level and is back within one step is not seen.
+struct Watch {
+    std::string name;  ///< a variable, or an element of one
+    double level = 0;  ///< in its unit
+    Crossing crossing = Crossing::either;
+};
+
 /// Options of `run`. Times are in seconds.
 struct Options {
     std::optional<double> t_start{}, t_end{};  ///< [s] default: those of the FMU, else 0 and 1
@@ -74,15 +84,17 @@ struct Options {
     /// Whether a run by model exchange or by co-simulation is wanted; default: the first that the
     /// FMU offers.
     std::optional<bool> co_simulation{};
+    std::vector<Watch> watch{};  ///< of co-simulation, by an FMU that keeps its state
     const std::atomic<bool>* cancelled = nullptr;  ///< ends the run after the step in progress
 };
 
-/// Why an FMU was put into event mode; several causes may hold at one instant.
+/// Why an FMU was put into event mode; several causes may hold at one instant. A passage of a
+/// watched variable is an event without event mode.
 struct Causes {
-    bool state = false, time = false, step = false, input = false;
+    bool state = false, time = false, step = false, input = false, passage = false;
 
     /// Whether there is a cause.
-    [[nodiscard]] bool any() const noexcept { return state || time || step || input; }
+    [[nodiscard]] bool any() const noexcept { return state || time || step || input || passage; }
     [[nodiscard]] bool operator==(const Causes&) const = default;
 };
 
@@ -92,15 +104,16 @@ struct Causes {
 /// `Event::indicator` of an event without one.
 inline constexpr std::size_t no_indicator = static_cast<std::size_t>(-1);
 
-/// An event mode of the FMU.
+/// An event mode of the FMU, or a passage of a watched variable.
 struct Event {
     double t = 0;  ///< [s]
     Causes causes;
     std::size_t indicator = no_indicator;
+    std::size_t watch = no_indicator;   ///< of `Options::watch`, of a passage
     std::vector<double> before, after;  ///< states; empty without states
 };
 
-/// Recorded values. At an event there are two rows of one time.
+/// Recorded values. At an event there are two rows of one time, at a passage there is one.
 struct Row {
     /// Where a row was recorded.
     enum class Place : std::uint8_t { sample, before_event, after_event };

@@ -115,6 +115,11 @@ fmi::Options options_of(const FmuRequest& request, const fmi::Description& d)
         const Assignment one = assignment("--set", text);
         options.start.emplace_back(one.name, one.value);
     }
+    for (const std::string& text : request.watch) {
+        const Assignment one = assignment("--watch", text);
+        options.watch.push_back({.name = one.name, .level = one.value});
+    }
+    if (!options.watch.empty()) options.co_simulation = true;
     if (request.input) options.inputs = read_inputs(*request.input);
     if (request.output) options.output = parts(*request.output, ',');
     if (request.samples || request.csv || request.plot) {

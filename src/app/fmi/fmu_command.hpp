@@ -14,6 +14,7 @@ struct FmuRequest {
     std::string file{};
     std::vector<std::string> words{};  ///< of `fmu`: [check] MODEL, or export SYSTEM
     std::vector<std::string> set{};    ///< name=value
+    std::vector<std::string> watch{};  ///< name=level
     std::optional<double> t_start{}, t_end{}, rtol{}, step{};
     std::optional<std::string> method{}, output{};  ///< `output`: names with commas between them
     std::optional<std::filesystem::path> input{}, csv{}, plot{};

@@ -33,9 +33,14 @@ std::string label(const Description& d, const std::string& name)
 }
 
 /// "state (indicator 1)"
-std::string title(const Description& d, const fmi::Event& event)
+std::string title(const FmuRun& of, const fmi::Event& event)
 {
+    const Description& d = of.fmu;
     std::string out = describe(event.causes);
+    if (event.watch != fmi::no_indicator) {
+        const fmi::Watch& watch = of.options.watch[event.watch];
+        return fmt::format("{} ({} = {})", out, watch.name, watch.level);
+    }
     if (event.indicator != fmi::no_indicator) {
         out += fmt::format(" ({})", d.indicator_name(event.indicator));
     }
@@ -48,7 +53,7 @@ std::string events_table(const FmuRun& of)
     const std::vector<std::string> states = of.fmu.state_names();
     std::size_t first = 6;
     for (const fmi::Event& event : of.run.events) {
-        first = std::max(first, title(of.fmu, event).size() + 1);
+        first = std::max(first, title(of, event).size() + 1);
     }
     std::string out = fmt::format("{:>4}  {:<{}}{:>{}}", "", "cause", first, "t [s]", wide - 2);
     // States of large models would not fit beside each other.
@@ -61,8 +66,8 @@ std::string events_table(const FmuRun& of)
     out += '\n';
     for (std::size_t k = 0; k < of.run.events.size(); ++k) {
         const fmi::Event& event = of.run.events[k];
-        out += fmt::format("{:>4}  {:<{}}{:>{}}", k + 1, title(of.fmu, event), first, event.t,
-                           wide - 2);
+        out +=
+            fmt::format("{:>4}  {:<{}}{:>{}}", k + 1, title(of, event), first, event.t, wide - 2);
         for (const auto* x : {&event.before, &event.after}) {
             for (std::size_t i = 0; i < std::min(shown, x->size()); ++i) {
                 out += fmt::format("{:>{}}", (*x)[i] + 0.0, wide);
@@ -112,7 +117,9 @@ Json json(const Description& d, const fmi::Event& event)
     if (event.causes.time) causes.push_back("time");
     if (event.causes.step) causes.push_back("step");
     if (event.causes.input) causes.push_back("input");
+    if (event.causes.passage) causes.push_back("passage");
     Json out{{"t", event.t}, {"causes", causes}};
+    if (event.watch != fmi::no_indicator) out["watch"] = event.watch;
     if (event.indicator != fmi::no_indicator) {
         out["indicator"] = d.indicator_name(event.indicator);
     }

@@ -95,6 +95,7 @@ void pass_event(E& event, const Pass& pass)
     pass(event.t);
     pass(event.causes);
     pass(event.indicator);
+    pass(event.watch);
     pass(event.before);
     pass(event.after);
 }

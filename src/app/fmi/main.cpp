@@ -40,6 +40,10 @@ void add_simulate_fmu(CLI::App& app, int& status)
              "automatic (default), dopri5, fehlberg78 or rosenbrock4");
     command.add_flag("--co-simulation", request->co_simulation,
                      "let the FMU integrate itself; default where it offers nothing else");
+    command
+        .add_option("--watch", request->watch,
+                    "locate where a variable passes a level, in co-simulation; may be repeated")
+        ->type_name("name=level ...");
     add_number(command, "--step", request->step, "H", "communication step of co-simulation [s]");
     add_whole_number(command, "--max-steps", request->max_steps, 1,
                      std::numeric_limits<std::uint64_t>::max(),

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <exception>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -68,6 +69,7 @@ py::list causes_of(const Causes& causes)
     if (causes.time) out.append("time");
     if (causes.step) out.append("step");
     if (causes.input) out.append("input");
+    if (causes.passage) out.append("passage");
     return out;
 }
 
@@ -77,6 +79,7 @@ py::dict as_dict(const Description& d, const Run& run)
     for (const Event& event : run.events) {
         events.append(py::make_tuple(
             event.t, causes_of(event.causes),
+            event.watch != no_indicator ? py::object(py::int_(event.watch)) : py::none(),
             event.indicator == no_indicator ? "" : d.indicator_name(event.indicator),
             py::array_t<double>(static_cast<py::ssize_t>(event.before.size()), event.before.data()),
             py::array_t<double>(static_cast<py::ssize_t>(event.after.size()), event.after.data())));
@@ -132,6 +135,14 @@ py::dict run_fmu(const Fmu& fmu, const py::dict& given)
     options.sample_times = given["sample_times"].cast<std::vector<double>>();
     options.step = given["step"].cast<std::optional<double>>();
     options.co_simulation = given["co_simulation"].cast<std::optional<bool>>();
+    for (auto& [name, level, crossing] :
+         given["watch"].cast<std::vector<std::tuple<std::string, double, int>>>()) {
+        options.watch.push_back({.name = name,
+                                 .level = level,
+                                 .crossing = crossing < 0   ? ricochet::Crossing::falling
+                                             : crossing > 0 ? ricochet::Crossing::rising
+                                                            : ricochet::Crossing::either});
+    }
     for (const auto& item : given["tables"].cast<py::list>()) {
         auto [name, t, values] =
             item.cast<std::tuple<std::string, std::vector<double>, std::vector<double>>>();
