@@ -140,7 +140,13 @@ Library::Library(const std::filesystem::path& file, const Description& d, Kind k
     }
     handle_ = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
     if (handle_ == nullptr) {
-        throw Error(fmt::format("{}: cannot be loaded: {}", shown, last_error()));
+        const std::string why = last_error();
+        const bool python = why.find("undefined symbol: Py") != std::string::npos ||
+                            why.find("undefined symbol: _Py") != std::string::npos;
+        throw Error(fmt::format("{}: cannot be loaded: {}{}", shown, why,
+                                python ? "; it needs an interpreter of Python around it: use "
+                                         "ricochet.load_fmu there, or LD_PRELOAD its libpython"
+                                       : ""));
     }
     try {
         const Symbols from(handle_, d.version, shown);

@@ -69,6 +69,7 @@ TEST_F(FmuApp, APassageOfAWatchedVariableIsAnEvent)
     const Result text = run(words);
     EXPECT_EQ(text.status, 0) << text.err;
     EXPECT_NE(text.out.find("passage (height = 2)"), std::string::npos) << text.out;
+    EXPECT_NE(text.out.find("FMI 3.0; co-simulation"), std::string::npos) << text.out;
     Words as_json = words;
     as_json.push_back("--json");
     const auto events = json(as_json).at("events");

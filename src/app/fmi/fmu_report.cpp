@@ -154,8 +154,11 @@ std::string variable_line(const fmi::Variable& v)
 std::string fmu_run_text(const FmuRun& of)
 {
     const fmi::Run& run = of.run;
-    std::string out = fmt::format("{}: {}, FMI {}; {}, rtol {}\n\n", of.fmu.file, of.fmu.model_name,
-                                  of.fmu.version_text, name(run.method), of.options.rtol);
+    const std::string how = run.calls.steps > 0
+                                ? "co-simulation"
+                                : fmt::format("{}, rtol {}", name(run.method), of.options.rtol);
+    std::string out = fmt::format("{}: {}, FMI {}; {}\n\n", of.fmu.file, of.fmu.model_name,
+                                  of.fmu.version_text, how);
     if (!run.events.empty()) out += events_table(of) + '\n';
     std::vector<std::string> values;
     if (!run.rows.empty() && run.rows.back().t == run.t) {
