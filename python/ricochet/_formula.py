@@ -142,6 +142,34 @@ class Formula:
         self._ricochet_address = getattr(_ricochet.Formula, address)
         self._ricochet_user = self._ricochet_formula.address
 
+    @classmethod
+    def of_reset(cls, function, components, modes, within, args, title):
+        """A reset: function([mode,] t, x, *args) returns x, or with modes a mode or (mode, x).
+
+        Modes that are not ``within`` leave everything as it is.
+        """
+        self, tapes, following = cls.__new__(cls), [], []
+        for number, mode in enumerate([None] if modes is None else modes):
+            tape = _Tape()
+            state = [tape.add("component", i) for i in range(components)]
+            t = tape.add("time")
+            x = np.empty(components, dtype=object).view(Symbols)
+            x[:] = state
+            result = (mode, state)
+            if within is None or mode in within:
+                result = function(*(() if modes is None else (mode,)), t, x, *(args or ()))
+                if modes is None:
+                    result = (mode, result)
+                elif not isinstance(result, tuple):
+                    result = (result, state)
+            after, place = result
+            following.append(number if modes is None else modes.index(after))
+            tapes.append((tape.ops, cls._outputs(tape, place, components, title, True)))
+        self._ricochet_formula = _ricochet.Formula(components, tapes, following)
+        self._ricochet_address = _ricochet.Formula.reset_address
+        self._ricochet_user = self._ricochet_formula.address
+        return self
+
     @staticmethod
     def _outputs(tape, result, components, title, is_flow):
         results = np.asarray(result, dtype=object).ravel()

@@ -1,6 +1,7 @@
 """What the formula of a function depends on, so that one that is recorded can be kept."""
 
 import builtins
+import dis
 from enum import Enum, EnumMeta
 from functools import lru_cache
 from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, ModuleType
@@ -136,6 +137,50 @@ def fingerprint(functions, owner, args):
     except (_Unknown, TypeError, ValueError, RecursionError):  # of empty cells, unhashable members
         return None
     return out
+
+
+#: Methods that change their object, of lists, dictionaries, sets, files and generators.
+_CHANGING = ("append", "add", "update", "pop", "popitem", "clear", "extend", "insert", "remove",
+             "setdefault", "discard", "write", "send", "put", "appendleft", "sort", "reverse", "fill")
+_STORES = ("STORE_ATTR", "STORE_GLOBAL", "STORE_DEREF", "DELETE_ATTR", "DELETE_GLOBAL", "DELETE_SUBSCR",
+           "YIELD_VALUE", "IMPORT_NAME")
+
+
+@lru_cache(maxsize=1024)
+def _operations_of(code):
+    found = {instruction.opname for instruction in dis.get_instructions(code)}
+    for constant in code.co_consts:
+        if type(constant) is CodeType:
+            found |= _operations_of(constant)
+    return found
+
+
+def _changes_something(function, owner):
+    """Whether a function may change what is outside of it."""
+    code = function.__code__
+    operations = _operations_of(code)
+    names = _names_of(code)
+    if operations.intersection(_STORES) or set(names).intersection(_CHANGING):
+        return True
+    if "STORE_SUBSCR" not in operations:
+        return False
+    read = [cell.cell_contents for cell in function.__closure__ or ()]
+    read += [function.__globals__.get(name) for name in names]
+    read += [vars(owner).get(name) for name in names] if owner is not None else []
+    return any(isinstance(value, (list, dict, set, np.ndarray)) for value in read)
+
+
+def pure_fingerprint(functions, owner, args):
+    """As `fingerprint`, of functions that change nothing outside of them; else None."""
+    found = fingerprint(functions, owner, args)
+    if found is None:
+        return None
+    seen = {}
+    for function in functions:
+        _value(function, seen)
+    if owner is not None:
+        _members(owner, seen)
+    return None if any(_changes_something(function, owner) for function in tuple(seen)) else found
 
 
 class Kept:

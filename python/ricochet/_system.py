@@ -12,7 +12,7 @@ from ._compiled import (C_FLOW, C_GUARD, C_JACOBIAN, C_RATE, C_RESET, Compiled, 
                         is_compiled)
 from ._formula import Formula
 from ._inclusion import specification_of
-from ._kept import Kept, fingerprint
+from ._kept import Kept, fingerprint, pure_fingerprint
 from ._numbers import meant_by, number_from
 
 #: The largest number of events after which a guard can end the run.
@@ -327,7 +327,8 @@ class System:
         The number of components of a state whose flow and guards are formulas: they are called
         once with symbols, in each mode, and then computed without Python, also by
         ``method="taylor"``. They use arithmetic and functions of NumPy (np.sin, ...). Apart from
-        the mode, they must not compare their arguments or branch on them.
+        the mode, they must not compare their arguments or branch on them. Resets that do the same,
+        and change nothing outside of them, are computed without Python, too.
     set_valued
         An `Inclusion`: friction, relays and stops, of which the motion becomes a part where they
         hold something; or a method that returns one.
@@ -497,6 +498,39 @@ class System:
             guard["value"] = formula
         return formulas[0]
 
+    def _reset_formulas(self, args, guards):
+        """Puts formulas in place of the resets and rests that can be recorded; the time reset."""
+        given = [(guard, key) for guard in guards for key in ("reset", "rest") if guard[key]]
+        functions = [guard[key] for guard, key in given if not guard["directed"]]
+        if self.time_reset is not None:
+            functions.append(self.time_reset)
+        functions = [function for function in functions if not is_compiled(function)]
+        of = pure_fingerprint(functions, self, args)
+        modes = self._mode_list()
+        if of is None or not all(isinstance(mode, (int, str, Enum)) for mode in modes or ()):
+            return self.time_reset
+        of = of, self.formula, modes, [guard["in_modes"] for guard in guards]
+        kept = vars(self).setdefault("_kept_resets", Kept())
+        known, formulas = kept.pair
+        if known != of:
+            formulas = {}
+            for guard, key in given:
+                if not guard["directed"] and not is_compiled(guard[key]):
+                    formulas[guard["name"], key] = self._reset_formula(guard[key], guard["in_modes"], args)
+            if self.time_reset is not None and not is_compiled(self.time_reset):
+                formulas[None] = self._reset_formula(self.time_reset, None, args)
+            kept.pair = of, formulas
+        for guard, key in given:
+            guard[key] = formulas.get((guard["name"], key)) or guard[key]
+        return formulas.get(None) or self.time_reset
+
+    def _reset_formula(self, function, within, args):
+        """The formula of a reset; None where it cannot be recorded."""
+        try:
+            return Formula.of_reset(function, self.formula, self._mode_list(), within, args, "reset")
+        except Exception:  # a run calls it with numbers, and shows what is wrong
+            return None
+
     @staticmethod
     def _guard_formula(guard, components, modes, args):
         function, within = guard["value"], guard["in_modes"]
@@ -549,8 +583,10 @@ class System:
                              "guards=[Guard(name=...), ...]")
         if not guards and self.reset_set is not None:
             raise ValueError("reset_set: found it without guards, expected some, or a time_reset")
+        time_reset = self.time_reset
         if self.formula is not None:
             flow = self._formulas(args, guards)
+            time_reset = self._reset_formulas(args, guards)
         if watch is not None:
             flow = watch(flow, self.modes is not None)
         source = _ricochet.callback_system(dict(
@@ -559,7 +595,7 @@ class System:
             guard_values=self.guard_values, reset_set=self.reset_set,
             time_events=times, next_time_event=None if at else following,
             next_time_event_at=following if at else None, previous_time_event=preceding,
-            time_reset=as_function(self.time_reset, C_RESET, "time_reset"),
+            time_reset=as_function(time_reset, C_RESET, "time_reset"),
             changes_dimension=self.changes_dimension, as_list=self.vector == "list",
             jacobian=as_function(self.jacobian, C_JACOBIAN, "jacobian"),
             set_valued=specification_of(self.set_valued)))

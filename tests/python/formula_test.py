@@ -284,3 +284,139 @@ def test_modes_args_and_guards_have_their_own_formulas():
     assert ricochet.integrate(guarded, [0.0], 1.0).events["t"][0] == pytest.approx(0.5)
     guarded.guards = [ricochet.Guard(lambda t, x: x[0] - 0.75, direction=1)]
     assert ricochet.integrate(guarded, [0.0], 1.0).events["t"][0] == pytest.approx(0.75)
+
+
+def fall(t, x):
+    return [x[1], -9.81]
+
+
+def ball(reset, **guard):
+    return ricochet.System(fall, [ricochet.Guard(lambda t, x: x[0], reset=reset, unilateral=True, **guard)],
+                           formula=2)
+
+
+def impacts(system, t_end=8.0):
+    return ricochet.integrate(system, [10.0, 0.0], t_end).events["t"]
+
+
+def test_a_reset_that_changes_nothing_outside_is_called_for_its_formula_alone():
+    restitution = 0.8
+
+    def by_list(t, x):
+        return [0.0, -restitution * x[1]]
+
+    def in_place(t, x):
+        x[0], x[1] = 0, -restitution * x[1]
+        return x
+
+    expected = impacts(ricochet.System(fall, [ricochet.Guard(lambda t, x: x[0], reset=by_list)]))
+    assert len(expected) == 4
+    for reset in by_list, in_place:
+        system = ball(reset, rest=lambda t, x: [0.0, 0.0])
+        assert np.array_equal(impacts(system), expected)
+        kept = system._kept_resets.pair[1]
+        assert set(kept) == {("0", "reset"), ("0", "rest")} and all(kept.values())
+        recorded = kept["0", "reset"]
+        assert np.array_equal(impacts(system), expected)
+        assert system._kept_resets.pair[1]["0", "reset"] is recorded
+    # What it reads is read again.
+    restitution = 0.5
+    assert impacts(system)[1] != expected[1]
+    assert impacts(system)[1] == pytest.approx(2 * math.sqrt(20 / 9.81), abs=1e-12)
+
+
+def test_a_reset_with_an_effect_outside_is_called_at_each_event():
+    times, counts, total = [], {"floor": 0}, 0
+    random = np.random.default_rng(1)
+
+    def appends(t, x):
+        times.append(t)
+        return [0.0, -0.8 * x[1]]
+
+    def counts_in_a_dictionary(t, x):
+        counts["floor"] += 1
+        return [0.0, -0.8 * x[1]]
+
+    def counts_in_a_variable(t, x):
+        nonlocal total
+        total += 1
+        return [0.0, -0.8 * x[1]]
+
+    def by_another(t, x):
+        return appends(t, x)
+
+    found = impacts(ball(appends))
+    assert times == list(found) and len(found) == 4
+    impacts(ball(by_another))
+    assert times == 2 * list(found)
+    impacts(ball(counts_in_a_dictionary))
+    impacts(ball(counts_in_a_variable))
+    assert counts["floor"] == total == len(found)
+    drawn = impacts(ball(lambda t, x: [0.0, -random.uniform(0.7, 0.9) * x[1]]))
+    flights = np.diff(drawn)
+    assert len(set(np.round(flights[1:] / flights[:-1], 6))) == len(flights) - 1
+
+    class Counted(ricochet.System):
+        formula, n = 2, 0
+        flow = staticmethod(fall)
+
+        @ricochet.guard(unilateral=True)
+        def floor(self, t, x):
+            return x[0]
+
+        @floor.reset
+        def floor(self, t, x):
+            self.n += 1
+            return [0.0, -0.8 * x[1]]
+
+    system = Counted()
+    impacts(system)
+    assert system.n == len(found)
+
+
+def test_resets_that_compare_or_stop_remain_functions():
+    slow = impacts(ball(lambda t, x: [0.0, -0.8 * x[1] if x[1] < -5 else 0.0]), 20.0)
+    assert 3 < len(slow) < 12
+    run = ricochet.integrate(ball(lambda t, x: ricochet.Stop("enough")), [10.0, 0.0], 8.0)
+    assert run.outcome == "stopped_by_event" and len(run.events) == 1
+    with pytest.raises(ValueError, match="reset"):
+        impacts(ball(lambda t, x: [0.0]))
+
+
+def test_recorded_resets_change_modes_and_act_at_times():
+    class Thermostat(ricochet.System):
+        modes, formula = ("off", "on"), 1
+        time_events = [3.0]
+
+        def flow(self, mode, t, x):
+            return [-0.1 * (x[0] - (30.0 if mode == "on" else 0.0))]
+
+        def time_reset(self, mode, t, x):
+            return mode, x + 0.5
+
+        @ricochet.guard(in_modes=["off"])
+        def too_cold(self, mode, t, x):
+            return x[0] - 18
+
+        @too_cold.reset
+        def too_cold(self, mode, t, x):
+            return "on"
+
+        @ricochet.guard(in_modes=["on"])
+        def too_warm(self, mode, t, x):
+            return 22 - x[0]
+
+        @too_warm.reset
+        def too_warm(self, mode, t, x):
+            return "off", x - 0.25
+
+    class Called(Thermostat):
+        formula = None
+
+    system = Thermostat()
+    run = ricochet.integrate(system, [20.0], 48.0, mode="off")
+    expected = ricochet.integrate(Called(), [20.0], 48.0, mode="off")
+    assert all(system._kept_resets.pair[1].values()) and len(system._kept_resets.pair[1]) == 3
+    assert run.mode == expected.mode and len(run.events) == len(expected.events) > 10
+    assert np.array_equal(run.events["t"], expected.events["t"])
+    assert np.array_equal(run.x, expected.x)

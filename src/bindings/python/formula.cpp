@@ -66,6 +66,16 @@ void formula_flow(std::uint32_t mode, double t, const double* x, double* dxdt, s
     formulas.in(mode).evaluate(t, x, dxdt, scratch());
 }
 
+std::uint32_t formula_reset(std::uint32_t mode, double t, double* x, std::size_t n, void* user)
+{
+    thread_local std::vector<double> after;
+    const auto& formulas = *static_cast<const ModedFormula*>(user);
+    after.resize(n);
+    formulas.in(mode).evaluate(t, x, after, scratch());
+    std::copy(after.begin(), after.end(), x);
+    return mode < formulas.following.size() ? formulas.following[mode] : mode;
+}
+
 double formula_guard(std::uint32_t mode, double t, const double* x, std::size_t /*n*/, void* user)
 {
     const auto& formulas = *static_cast<const ModedFormula*>(user);

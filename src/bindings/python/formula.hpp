@@ -112,7 +112,8 @@ private:
 
 /// A formula for each mode. Its address is passed to compiled functions as `user`.
 struct ModedFormula {
-    std::vector<Formula> by_mode;  ///< one for all where there are no modes
+    std::vector<Formula> by_mode;            ///< one for all where there are no modes
+    std::vector<std::uint32_t> following{};  ///< of a reset: the mode after it, for each
 
     [[nodiscard]] const Formula& in(std::uint32_t mode) const noexcept
     {
@@ -124,5 +125,7 @@ struct ModedFormula {
 void formula_flow(std::uint32_t mode, double t, const double* x, double* dxdt, std::size_t n,
                   void* user);
 double formula_guard(std::uint32_t mode, double t, const double* x, std::size_t n, void* user);
+/// The same for a `CompiledReset`.
+std::uint32_t formula_reset(std::uint32_t mode, double t, double* x, std::size_t n, void* user);
 
 }  // namespace ricochet::python

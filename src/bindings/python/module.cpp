@@ -136,19 +136,26 @@ PYBIND11_MODULE(_ricochet, module)
         std::pair<std::vector<std::tuple<std::string, std::size_t, std::size_t, double>>,
                   std::vector<std::size_t>>>;
     py::class_<ModedFormula, std::shared_ptr<ModedFormula>>(module, "Formula")
-        .def(py::init([](std::size_t components, const Formulas& modes) {
-            auto out = std::make_shared<ModedFormula>();
-            for (const auto& [ops, outputs] : modes)
-                out->by_mode.emplace_back(components, ops, outputs);
-            return out;
-        }))
+        .def(py::init([](std::size_t components, const Formulas& modes,
+                         std::vector<std::uint32_t> following) {
+                 auto out = std::make_shared<ModedFormula>();
+                 for (const auto& [ops, outputs] : modes)
+                     out->by_mode.emplace_back(components, ops, outputs);
+                 out->following = std::move(following);
+                 return out;
+             }),
+             py::arg("components"), py::arg("modes"),
+             py::arg("following") = std::vector<std::uint32_t>())
         .def_property_readonly(
             "address", [](ModedFormula& self) { return std::bit_cast<std::uintptr_t>(&self); })
         .def_property_readonly_static(
             "flow_address",
             [](const py::object&) { return std::bit_cast<std::uintptr_t>(&formula_flow); })
-        .def_property_readonly_static("guard_address", [](const py::object&) {
-            return std::bit_cast<std::uintptr_t>(&formula_guard);
+        .def_property_readonly_static(
+            "guard_address",
+            [](const py::object&) { return std::bit_cast<std::uintptr_t>(&formula_guard); })
+        .def_property_readonly_static("reset_address", [](const py::object&) {
+            return std::bit_cast<std::uintptr_t>(&formula_reset);
         });
     bind_network(module);
     bind_runs(module);
