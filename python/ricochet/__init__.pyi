@@ -283,6 +283,9 @@ class Scene:
     def terrain(self, points: ArrayLike, *, closed: bool = False, material: Optional[str] = None,
                 motion: Optional[Mapping[str, Any]] = None,
                 name: Optional[str] = None) -> int: ...
+    def arc(self, centre: ArrayLike, *, radius: Optional[float] = None,
+            start: Optional[ArrayLike] = None, end: Optional[ArrayLike] = None,
+            material: Optional[str] = None, name: Optional[str] = None) -> int: ...
     def spring(self, first: Union[int, str], second: Union[int, str], *, stiffness: float,
                rest: float = 0.0, damping: float = 0.0) -> None: ...
     @property

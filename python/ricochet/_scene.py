@@ -207,6 +207,20 @@ class Scene:
         return self._scene.terrain(_text(name), ends.tolist(), bool(closed),
                                    self._material(material), motion)
 
+    def arc(self, centre, *, radius=None, start=None, end=None, material=None, name=None):
+        """Adds a circle of this ``radius``, or the part of one that leads counterclockwise from
+        ``start`` to ``end``; both are met from both sides. Returns its number among the surfaces.
+        """
+        if (radius is None) == (start is None and end is None) or (start is None) != (end is None):
+            raise ValueError(f"arc: found radius={radius!r}, start={start!r} and end={end!r}, expected "
+                             "a radius, or a start and an end")
+        ends = [[0.0, 0.0]] * 2 if start is None else [_pair(start, "start"), _pair(end, "end")]
+        size = 0.0 if radius is None else number_from(radius, "radius")
+        if radius is not None and not size > 0:
+            raise ValueError(f"arc: found radius={radius!r}, expected a positive number")
+        return self._scene.arc(_text(name), _pair(centre, "centre"), size, ends,
+                               self._material(material))
+
     def _number(self, body):
         if isinstance(body, str):
             return self._scene.body(body)

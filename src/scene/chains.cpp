@@ -45,7 +45,7 @@ public:
     {
         std::uint32_t first = wall_count;
         for (const Scene::Surface& surface : scene.surfaces()) {
-            if (surface.is_wall || moves(surface.motion)) continue;
+            if (surface.is_wall || surface.is_arc() || moves(surface.motion)) continue;
             const auto count = static_cast<std::uint32_t>(surface.points.size());
             const bool closed = surface.points.front() == surface.points.back();
             if (!closed) chains_.push_back({.points = &surface.points, .first = first});

@@ -385,7 +385,10 @@ void ContactIsland::commit(double s)
     planned_ = 0;
     // A moving wall is not on the straight line of a step when the step is cut.
     const auto moving = [](const IslandWall& wall) { return wall.motion != nullptr; };
-    if (!whole && std::ranges::any_of(walls_, moving)) project();
+    if (!whole && std::ranges::any_of(walls_, moving)) project(options_.largest_overlap);
+    // The straight line of a step leads behind an arc that is met from inside.
+    const auto curved = [](const IslandWall& wall) { return wall.radius > 0; };
+    if (std::ranges::any_of(walls_, curved)) project(std::numeric_limits<double>::infinity());
 }
 
 /// The largest change of velocity by forces alone in the current step.

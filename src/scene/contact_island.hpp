@@ -125,7 +125,7 @@ private:
     struct Touch {
         int body = 0, other = 0;  ///< places; of a body or of a wall
         bool wall = false;
-        bool at_end = false;  ///< of a segment: at one of its ends
+        bool at_end = false;  ///< of a segment or an arc: at one of its ends
         Point normal{}, end{};
         double gap = 0;
         ContactCoefficients law{};
@@ -137,7 +137,7 @@ private:
 
     void check(const IslandSetup& setup) const;
     void sort_members(IslandSetup setup);
-    void project();
+    void project(double most);
     [[nodiscard]] std::string name_of(const Touch& touch) const;
     [[nodiscard]] double size_of(int body) const;
     [[nodiscard]] int place_of(std::uint32_t id) const;
@@ -146,6 +146,7 @@ private:
     void pair_touches(const std::vector<double>& reach);
     void wall_touches(int body, double reach);
     bool wall_touch(const Point& at, const Point& moved, Touch& touch) const;
+    bool arc_touch(const IslandWall& arc, const Point& at, Touch& touch) const;
     [[nodiscard]] std::array<double, 2> wall_displacement(int wall, double from, double to) const;
 
     bool attempt(double h);

@@ -29,7 +29,7 @@ auto key(const IslandBody& b)
 auto key(const IslandWall& w)
 {
     return std::tuple(w.is_segment, w.point[0], w.point[1], w.normal[0], w.normal[1], w.end[0],
-                      w.end[1]);
+                      w.end[1], w.radius, w.span.from, w.span.to);
 }
 
 void check_body(const IslandBody& b)
@@ -56,7 +56,8 @@ void ContactIsland::check(const IslandSetup& setup) const
     for (const IslandBody& b : setup.bodies) check_body(b);
     for (const IslandWall& w : setup.walls) {
         const bool unit = std::abs(std::hypot(w.normal[0], w.normal[1]) - 1) < 1e-9;
-        if (!finite(w.point) || (w.is_segment ? !finite(w.end) : !unit)) {
+        const bool directed = w.is_segment ? finite(w.end) : w.radius > 0 || unit;
+        if (!finite(w.point) || !directed) {
             refuse(
                 fmt::format("wall {} needs finite points, and a line a normal of length 1", w.id));
         }
@@ -108,7 +109,7 @@ ContactIsland::ContactIsland(IslandSetup setup, const IslandOptions& options, do
 {
     check(setup);
     sort_members(std::move(setup));
-    project();
+    project(options_.largest_overlap);
 }
 
 int ContactIsland::place_of(std::uint32_t id) const
@@ -134,8 +135,9 @@ std::string ContactIsland::name_of(const Touch& touch) const
 }
 
 /// Moves bodies onto their surfaces by the shortest way, weighted by mass. This amounts to a
-/// minimal change of the time for which gravity acts: velocities are unchanged.
-void ContactIsland::project()
+/// minimal change of the time for which gravity acts: velocities are unchanged. Overlaps of more
+/// than `most`, as a fraction of the coordinates, are refused.
+void ContactIsland::project(double most)
 {
     const std::vector<double> close(bodies_.size(), 0.0);
     problem_.inertia.clear();
@@ -149,7 +151,7 @@ void ContactIsland::project()
         problem_.momentum.setZero(q_.size());
         for (const Touch& touch : touches_) {
             const double size = size_of(touch.body);
-            if (!(touch.gap >= -options_.largest_overlap * size)) {
+            if (!(touch.gap >= -most * size)) {
                 refuse(fmt::format("{} overlap by {} m", name_of(touch), -touch.gap));
             }
             deepest = std::max(deepest, -touch.gap / size);
@@ -195,6 +197,7 @@ bool ContactIsland::wall_touch(const Point& at, const Point& moved, Touch& touch
     const double radius = bodies_[static_cast<std::size_t>(body)].radius;
     const double x = at[0] - moved[0] - w.point[0];
     const double y = at[1] - moved[1] - w.point[1];
+    if (w.radius > 0) return arc_touch(w, {at[0] - moved[0], at[1] - moved[1]}, touch);
     if (!w.is_segment) {
         touch.normal = w.normal;
         touch.gap = x * w.normal[0] + y * w.normal[1] - radius;
@@ -212,6 +215,24 @@ bool ContactIsland::wall_touch(const Point& at, const Point& moved, Touch& touch
     touch.gap = distance - radius;
     touch.at_end = part <= 0 || part >= 1;
     if (touch.at_end) touch.end = part <= 0 ? w.point : w.end;
+    return true;
+}
+
+/// The same for an arc, from the side on which the body is, or for the end of the arc beside it.
+bool ContactIsland::arc_touch(const IslandWall& arc, const Point& at, Touch& touch) const
+{
+    const double radius = bodies_[static_cast<std::size_t>(touch.body)].radius;
+    const Vector2 nearest = nearest_on_arc(arc.point, arc.radius, arc.span, at);
+    const Vector2 apart = at - arc.point;
+    touch.at_end = !arc.span.contains(apart, 0);
+    touch.end = nearest;
+    const Vector2 away = touch.at_end ? at - nearest : apart;
+    const double distance = norm(away);
+    if (!(distance > 0)) return false;
+    const bool inside = !touch.at_end && distance < arc.radius;
+    const double sign = inside ? -1 : 1;
+    touch.normal = {sign * away[0] / distance, sign * away[1] / distance};
+    touch.gap = sign * (touch.at_end ? distance : distance - arc.radius) - radius;
     return true;
 }
 
@@ -262,7 +283,7 @@ void ContactIsland::wall_touches(int body, double reach)
         if (!wall_touch({q_[2 * body], q_[2 * body + 1]}, moved, touch)) continue;
         if (!(touch.gap <= reach + way)) continue;
         // Where two segments end at one point, both have that contact.
-        const bool again = wall.is_segment && !wall.motion &&
+        const bool again = (wall.is_segment || wall.radius > 0) && !wall.motion &&
                            std::any_of(touches_.begin() + static_cast<std::ptrdiff_t>(own),
                                        touches_.end(), [&](const Touch& c) {
                                            return c.at_end && touch.at_end && c.end == touch.end;

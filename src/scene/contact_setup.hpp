@@ -6,6 +6,8 @@
 #include <functional>
 #include <vector>
 
+#include "scene/arcs.hpp"
+
 namespace ricochet::detail {
 
 struct IslandBody {
@@ -29,13 +31,16 @@ struct WallMotion {
     std::function<double(double t)> next_break{};
 };
 
-/// A line that bounds bodies on one side, or a segment that acts on both, including its ends.
+/// A line that bounds bodies on one side, or a segment or an arc that acts on both, including its
+/// ends.
 struct IslandWall {
     std::uint32_t id = 0;
     bool is_segment = false;
-    std::array<double, 2> point{};   ///< [m] of the line, or where the segment begins
+    std::array<double, 2> point{};   ///< [m] of the line, start of the segment, centre of the arc
     std::array<double, 2> normal{};  ///< of the line, of length 1
     std::array<double, 2> end{};     ///< [m] of the segment
+    double radius = 0;               ///< [m] of the arc, 0 for others
+    ArcSpan span{};                  ///< of the arc
     std::uint32_t material = 0;
     const WallMotion* motion = nullptr;  ///< outlives the island
 };

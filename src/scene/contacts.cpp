@@ -60,7 +60,10 @@ IslandSetup Contacts::setup_of(const std::vector<std::uint32_t>& members,
         if (face.kind == Face::Kind::vertex) continue;  // segments include their ends
         IslandWall wall{.id = f, .point = face.at, .normal = face.normal};
         wall.material = face.material;
-        if (face.kind == Face::Kind::segment) {
+        if (face.kind == Face::Kind::arc) {
+            wall.radius = face.length;
+            wall.span = face.span;
+        } else if (face.kind == Face::Kind::segment) {
             wall.is_segment = true;
             wall.end = face.at - face.length * turned(face.normal);
         }

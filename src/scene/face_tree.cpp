@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include "scene/world.hpp"
@@ -31,10 +32,20 @@ const Face& FaceTree::face(std::uint32_t number) const
     return world_->faces[number];
 }
 
-Vector2 FaceTree::end_of(std::uint32_t number) const
+/// The least square around a face, or around the whole circle of an arc.
+Square FaceTree::box_of(std::uint32_t number) const
 {
     const Face& of = face(number);
-    return of.at - of.length * turned(of.normal);
+    if (of.kind == Face::Kind::arc) {
+        const Vector2 reach{of.length, of.length};
+        return {of.at - reach, of.at + reach};
+    }
+    const Vector2 end = of.at - of.length * turned(of.normal);
+    Square box;
+    for (std::size_t c = 0; c < 2; ++c) {
+        std::tie(box.low[c], box.high[c]) = std::minmax(of.at[c], end[c]);
+    }
+    return box;
 }
 
 /// The box around all faces, their largest coordinate and the median of their lengths [m].
@@ -43,14 +54,13 @@ void FaceTree::bound(Square& around, double& largest, double& length) const
     around = {{never, never}, {-never, -never}};
     std::vector<double> lengths;
     for (std::uint32_t f = world_->wall_count; f < world_->fixed_count; ++f) {
-        for (const Vector2& p : {face(f).at, end_of(f)}) {
-            for (std::size_t c = 0; c < 2; ++c) {
-                around.low[c] = std::min(around.low[c], p[c]);
-                around.high[c] = std::max(around.high[c], p[c]);
-                largest = std::max(largest, std::fabs(p[c]));
-            }
+        const Square box = box_of(f);
+        for (std::size_t c = 0; c < 2; ++c) {
+            around.low[c] = std::min(around.low[c], box.low[c]);
+            around.high[c] = std::max(around.high[c], box.high[c]);
+            largest = std::max({largest, std::fabs(box.low[c]), std::fabs(box.high[c])});
         }
-        if (face(f).kind == Face::Kind::segment) lengths.push_back(face(f).length);
+        if (face(f).kind != Face::Kind::vertex) lengths.push_back(face(f).length);
     }
     const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
     std::nth_element(lengths.begin(), middle, lengths.end());
@@ -109,15 +119,14 @@ void FaceTree::add(const Square& square, std::vector<std::uint32_t> faces)
 /// it can.
 bool FaceTree::reaches(std::uint32_t number, const Square& square) const
 {
-    const Vector2 from = face(number).at;
-    const Vector2 end = end_of(number);
+    const Square box = box_of(number);
     for (std::size_t c = 0; c < 2; ++c) {
-        const auto [least, greatest] = std::minmax(from[c], end[c]);
-        if (least > square.high[c] + reach_ || greatest < square.low[c] - reach_) return false;
+        if (box.low[c] > square.high[c] + reach_ || box.high[c] < square.low[c] - reach_)
+            return false;
     }
     const Vector2 extent = square.high - square.low;
     const Vector2 middle = square.low + 0.5 * extent;
-    const double apart = norm(middle - nearest_on(from, end, middle));
+    const double apart = norm(middle - nearest_on(face(number), middle));
     return !(apart > reach_ + 0.5001 * norm(extent));
 }
 
@@ -226,7 +235,7 @@ void FaceTree::append_within(const Vector2& p, double distance,
             continue;
         }
         for (const std::uint32_t f : nodes_[node.source].faces) {
-            if (norm(p - nearest_on(face(f).at, end_of(f), p)) <= distance) found.push_back(f);
+            if (norm(p - nearest_on(face(f), p)) <= distance) found.push_back(f);
         }
     }
 }

@@ -63,7 +63,7 @@ private:
     };
 
     [[nodiscard]] const Face& face(std::uint32_t number) const;
-    [[nodiscard]] Vector2 end_of(std::uint32_t face) const;
+    [[nodiscard]] Square box_of(std::uint32_t face) const;
     [[nodiscard]] bool reaches(std::uint32_t face, const Square& square) const;
     void bound(Square& around, double& largest, double& length) const;
     void divide(std::uint32_t number);

@@ -168,8 +168,8 @@ public:
     SceneFile read(const json& whole)
     {
         const Part top(whole, {}, "a scene");
-        top.only({"gravity", "memory_limit", "materials", "bodies", "walls", "terrain", "springs",
-                  "run"});
+        top.only({"gravity", "memory_limit", "materials", "bodies", "walls", "terrain", "arcs",
+                  "springs", "run"});
         Scene::Settings settings;
         top.vector("gravity", settings.gravity);
         top.number("memory_limit", settings.memory_limit);
@@ -180,6 +180,9 @@ public:
         });
         top.each("terrain", [&](const json& value, const JsonPath& path) {
             terrain({value, path, "terrain"}, file.scene);
+        });
+        top.each("arcs", [&](const json& value, const JsonPath& path) {
+            arc({value, path, "an arc"}, file.scene);
         });
         std::vector<std::size_t> ends;  // of the bodies of each entry
         top.each("bodies", [&](const json& value, const JsonPath& path) {
@@ -293,6 +296,26 @@ private:
         terrain.material = material_of(part);
         terrain.motion = motion_of(part);
         part.ask([&] { return scene.terrain(terrain); });
+    }
+
+    void arc(const Part& part, Scene& scene) const
+    {
+        part.only({"name", "centre", "radius", "from", "to", "material"});
+        Arc arc{.centre = part.vector("centre")};
+        part.text("name", arc.name);
+        if (part.has("radius") == (part.has("from") || part.has("to"))) {
+            part.fail(
+                fmt::format(R"(expected either "radius", or "from" and "to" in an arc, found {})",
+                            part.has("radius") ? "both" : "neither"));
+        }
+        if (part.has("radius")) {
+            arc.radius = part.number("radius");
+            if (!(arc.radius > 0)) part.expected("a positive number", "radius", part.at("radius"));
+        } else {
+            arc.ends = {part.vector("from"), part.vector("to")};
+        }
+        arc.material = material_of(part);
+        part.ask([&] { return scene.arc(arc); });
     }
 
     void body(const Part& part, Scene& scene) const

@@ -190,6 +190,31 @@ static double slack_of(const Face& face, double radius, const Vector2& p, double
     return radius == 0 ? World::end_slack(face, p, flown) : 0.5 * World::rounding(p, 0);
 }
 
+/// [m] Rounding of the gap between an arc and a body at p.
+static double rounding_at_arc(const Face& face, double radius, const Vector2& p)
+{
+    return World::rounding(p, radius) + World::rounding(face.at, face.length);
+}
+
+/// Whether a body on the circle of an arc, or parallel to it, is beside the arc itself.
+static bool lies_on_arc(const Face& face, double radius, const Vector2& p, double flown)
+{
+    const double slack =
+        radius == 0 ? World::end_slack(face, p, flown) : 0.5 * World::rounding(p, 0);
+    return face.span.contains(p - face.at, slack / face.length);
+}
+
+static FaceGap arc_gap(const Face& face, const Body& body, const Vector2& p, bool outside,
+                       double flown)
+{
+    const Vector2 apart = p - face.at;
+    const double distance = norm(apart);
+    if (distance == 0 || !lies_on_arc(face, body.radius, p, flown)) return {};
+    const Vector2 out{apart[0] / distance, apart[1] / distance};
+    if (outside) return {distance - face.length - body.radius, out};
+    return {face.length - distance - body.radius, -1.0 * out};
+}
+
 FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above, double flown)
 {
     const double radius = body.radius;
@@ -201,6 +226,7 @@ FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool abov
         const Vector2 normal = above ? face.normal : -1.0 * face.normal;
         return {dot(p - face.at, normal) - radius, normal};
     }
+    if (face.kind == Face::Kind::arc) return arc_gap(face, body, p, above, flown);
     if (radius == 0) return {};
     const Vector2 apart = p - face.at;
     const double distance = norm(apart);
@@ -309,11 +335,148 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
     return meeting.after < never ? meeting : Meeting{};
 }
 
+namespace {
+
+/// Search for the first contact of a body with an arc. The gap to its outside closes where the
+/// distance from the centre falls to R + r, the gap to its inside where it rises to R - r.
+class ArcSearch {
+public:
+    ArcSearch(const World& world, std::uint32_t i, std::uint32_t which)
+        : world_(world),
+          face_(world.faces[which]),
+          body_(world.bodies[i]),
+          i_(i),
+          path_(world.path(i, body_.t)),
+          rounding_(rounding_at_arc(face_, body_.radius, path_.c[0])),
+          outside_(world.begins_above(body_, which))
+    {
+        apart_ = path_;
+        apart_.c[0] = path_.c[0] - face_.at;
+        distance_ = norm(apart_.c[0]);
+    }
+
+    [[nodiscard]] Meeting first() const
+    {
+        if (std::isfinite(path_.until) && is_out_of_reach()) return {};
+        Meeting best{.from = body_.t};
+        for (const bool outer : {true, false}) {
+            if (face_.span.whole && outer != outside_) continue;
+            const double reach = face_.length + (outer ? body_.radius : -body_.radius);
+            if (!(reach > 0)) continue;
+            const Meeting found = from_side(outer, reach);
+            if (found.after < best.after) best = found;
+        }
+        return best;
+    }
+
+private:
+    [[nodiscard]] bool is_out_of_reach() const
+    {
+        const double way = reach_of(path_);
+        return std::fabs(distance_ - face_.length) - body_.radius > way;
+    }
+
+    /// The first contact from outside, or from inside: at this distance from the centre.
+    [[nodiscard]] Meeting from_side(bool outer, double reach) const
+    {
+        const double sign = outer ? 1 : -1;
+        Squares now = squares(apart_.c[0], apart_.c[1], reach, rounding_);
+        const double gap = sign * (distance_ - reach);
+        const bool closed =
+            body_.radius == 0 ? std::fabs(gap) <= rounding_ : gap <= rounding_ && outer == outside_;
+        const bool touches = closed && lies_on_arc(face_, body_.radius, path_.c[0], 0);
+        if (touches && outer == outside_) {
+            const double slowest = noise(path_.c[1], {}) * distance_ + norm(path_.c[1]) * rounding_;
+            const double bend = dot(path_.c[1], path_.c[1]) + 2 * dot(apart_.c[0], path_.c[2]);
+            if (std::fabs(now.rate) <= slowest) {
+                now.rate = 0;
+                if (sign * bend < 0) return {.from = body_.t, .after = 0, .presses = true};
+            } else if (sign * now.rate < 0) {
+                return {.from = body_.t, .after = 0};
+            }
+        }
+        if (touches) now.at_once = 0;
+        const Departure begin = touches ? departure(gap, rounding_) : Departure{};
+        for (const double s : closings(now, sign, reach)) {
+            if (!(s < never)) break;
+            const double after = located(s, sign, reach, begin);
+            if (lands(after)) return {.from = body_.t, .after = after};
+        }
+        return {};
+    }
+
+    /// Times after the start at which the gap closes, ascending, followed by `never`.
+    [[nodiscard]] std::array<double, largest_degree> closings(const Squares& now, double sign,
+                                                              double reach) const
+    {
+        std::array<double, largest_degree> times;
+        times.fill(never);
+        if (path_.degree <= 1) {
+            times[0] = straight_closing(now, sign, reach);
+            return times;
+        }
+        Polynomial gap = squared(apart_, now);
+        for (double& c : gap) c *= sign;
+        return falls_in(gap, 2 * path_.degree, path_.until);
+    }
+
+    /// The same on a straight line, which enters and leaves a circle once.
+    [[nodiscard]] double straight_closing(const Squares& now, double sign, double reach) const
+    {
+        const Vector2& v = path_.c[1];
+        const double square = discriminant(apart_.c[0], v, reach);
+        if (is_zero(v)) return never;
+        const bool leaves_inside = sign < 0 && now.at_once == 0 && now.rate < 0;
+        if (!(square >= 0)) return leaves_inside ? -2 * now.rate / dot(v, v) : never;
+        if (sign > 0) {
+            return now.at_once > 0 && now.rate < 0 ? now.at_once / (std::sqrt(square) - now.rate)
+                                                   : never;
+        }
+        if (now.rate < 0) {  // it has touched, or enters before it leaves
+            return (std::sqrt(square) - now.rate) / dot(v, v);
+        }
+        return now.at_once < 0 ? -now.at_once / (now.rate + std::sqrt(square)) : never;
+    }
+
+    /// The time on the method's own map, where the body advances by steps. On a parabola it is
+    /// corrected once, since the square of the distance has lost digits of the gap.
+    [[nodiscard]] double located(double s, double sign, double reach, const Departure& begin) const
+    {
+        if (path_.degree < 2) return s;
+        return on_map(s, path_.until, [&](double after) {
+            const Instant t = body_.t.after(after);
+            const Vector2 from_centre = world_.position(i_, t) - face_.at;
+            const double distance = norm(from_centre);
+            const double rate = dot(from_centre, world_.velocity(i_, t)) / distance;
+            return GapAndRate{begin.left_of(sign * (distance - reach)), sign * rate};
+        });
+    }
+
+    [[nodiscard]] bool lands(double after) const
+    {
+        if (face_.span.whole) return true;
+        const Vector2 p = world_.position(i_, body_.t.after(after));
+        return lies_on_arc(face_, body_.radius, p, rounding_of_flight(body_, after));
+    }
+
+    const World& world_;
+    const Face& face_;
+    const Body& body_;
+    std::uint32_t i_;
+    Path path_, apart_;
+    double distance_ = 0;
+    double rounding_ = 0;
+    bool outside_ = true;
+};
+
+}  // namespace
+
 Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t which)
 {
     const Face& face = world.faces[which];
     const Body& b = world.bodies[i];
     if (b.held == which) return {};
+    if (face.kind == Face::Kind::arc) return ArcSearch(world, i, which).first();
     if (face.kind != Face::Kind::vertex) return meet_line(world, i, which);
     if (b.radius == 0) return {};
     if (b.held != none && world.faces[b.held].kind == Face::Kind::segment) {

@@ -116,7 +116,10 @@ std::array<double, largest_degree> falls_in(const Polynomial& c, int degree, dou
 {
     std::array<double, largest_degree> falls;
     falls.fill(never);
-    const Roots roots = roots_in(c, degree, until);
+    while (degree > 0 && c[static_cast<std::size_t>(degree)] == 0) --degree;
+    if (degree == 0) return falls;
+    const double end = std::isfinite(until) ? until : bound_of_roots(c, degree);
+    const Roots roots = roots_in(c, degree, end);
     int count = 0;
     for (int r = 0; r < roots.count; ++r) {
         const double s = roots.at[static_cast<std::size_t>(r)];

@@ -44,8 +44,8 @@ using Polynomial = std::array<double, largest_degree + 1>;
 [[nodiscard]] double falls_within(Polynomial c, int degree, double until,
                                   double tolerance) noexcept;
 
-/// Times in (0, until] at which a polynomial falls through zero, ascending, followed by `never`. A
-/// root at zero is not one of them.
+/// Times in (0, until], which may be infinite, at which a polynomial falls through zero, ascending,
+/// followed by `never`. A root at zero is not one of them.
 [[nodiscard]] std::array<double, largest_degree> falls_in(const Polynomial& c, int degree,
                                                           double until) noexcept;
 

@@ -240,8 +240,8 @@ bool Runner::may_leave(std::uint32_t number, std::uint32_t i) const
     for (const std::uint32_t f : faces_near({i})) {
         if (world_.moves(f)) return false;  // the face carries it
         const Face& face = world_.faces[f];
-        if (face.kind != Face::Kind::vertex) continue;
-        const double gap = norm(body.p - face.at) - body.radius;
+        if (face.kind != Face::Kind::vertex && face.kind != Face::Kind::arc) continue;
+        const double gap = norm(body.p - nearest_on(face, body.p)) - body.radius;
         if (gap > 1e-9 * (body.radius + norm(body.p))) continue;
         return false;
     }

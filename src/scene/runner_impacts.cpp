@@ -87,8 +87,15 @@ void Runner::add_couplings()
     if (!cluster_.couplings.empty()) cluster_.impulses.assign(cluster_.bodies.size(), {});
 }
 
-/// Segments that a point touches now, and its side of each, from the record that has led there;
-/// the segment `sure` is the first of them, at any distance.
+/// [m/s] Speed at which the gap between a point and a face changes.
+static double closing_speed(const Face& face, const Vector2& p, const Vector2& v)
+{
+    if (face.kind != Face::Kind::arc) return std::fabs(dot(v, face.normal));
+    return std::fabs(dot(v, p - face.at)) / norm(p - face.at);
+}
+
+/// Segments and arcs that a point touches now, and its side of each, from the record that has led
+/// there; the segment `sure` is the first of them, at any distance.
 std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
 {
     std::vector<Side> sides;
@@ -99,12 +106,12 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
     const double flown = rounding_of_flight(body, seconds(body.t, now_));
     for (const std::uint32_t f : faces_of(i)) {
         const Face& face = world_.faces[f];
-        if (face.kind != Face::Kind::segment) continue;
+        if (face.kind != Face::Kind::segment && face.kind != Face::Kind::arc) continue;
         const bool above = world_.arrives_above(body, f, p, v);
         if (f != sure) {
             const double gap = face_gap(face, body, p, above, flown).gap;
             const double tolerance = World::rounding(p, 0) + World::blur(face, 0) + flown +
-                                     2 * resolution(now_) * std::fabs(dot(v, face.normal));
+                                     2 * resolution(now_) * closing_speed(face, p, v);
             // Four times, since the point is moved onto the line of another segment before it goes
             // on.
             if (std::fabs(gap) > 4 * tolerance) continue;
@@ -128,8 +135,12 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
         contact.normal = normal;
         contact.at = p - body.radius * normal;
-        if (world_.faces[f].kind == Face::Kind::vertex && body.radius > 0) {
+        const Face::Kind kind = world_.faces[f].kind;
+        if (kind == Face::Kind::vertex && body.radius > 0) {
             contact.blur = World::rounding(p, body.radius) / body.radius;
+        } else if (kind == Face::Kind::arc) {
+            const double distance = norm(p - world_.faces[f].at);
+            contact.blur = World::rounding(p, world_.faces[f].length) / distance;
         }
         contact.restitution = world_.restitution(body.material, world_.faces[f].material);
         contact.friction = world_.friction(body.material, world_.faces[f].material);
@@ -141,7 +152,8 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         if (face.kind == Face::Kind::wall && f != sure && dot(p - face.at, face.normal) > near) {
             return;
         }
-        const bool above = face.kind == Face::Kind::segment && world_.arrives_above(body, f, p, v);
+        const bool two_sided = face.kind == Face::Kind::segment || face.kind == Face::Kind::arc;
+        const bool above = two_sided && world_.arrives_above(body, f, p, v);
         const FaceGap at = face_gap(face, body, p, above);
         double tolerance = World::rounding(p, body.radius) + World::blur(face, body.radius) +
                            2 * resolution(now_) * std::fabs(dot(v, at.normal));
@@ -156,6 +168,10 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
     const double flown = rounding_of_flight(body, seconds(body.t, now_));
     for (const Side& side : cluster_.sides.back()) {
         const Face& face = world_.faces[side.face];
+        if (face.kind == Face::Kind::arc) {
+            touch(side.face, face_gap(face, body, p, side.above, flown).normal);
+            continue;
+        }
         if (side.face != sure && world_.passes_end(body, side.face, side.above, p, v, flown)) {
             continue;
         }

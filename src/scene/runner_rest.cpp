@@ -12,7 +12,7 @@ std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
     std::vector<std::uint32_t> faces;
     const auto look = [&](std::uint32_t f) {
         const Face& face = world_.faces[f];
-        if (face.kind == Face::Kind::vertex) return;
+        if (face.kind == Face::Kind::vertex || face.kind == Face::Kind::arc) return;
         const bool above = face.kind == Face::Kind::segment && world_.begins_above(body, f);
         const double gap = face_gap(face, body, body.p, above).gap;
         const double rounding =

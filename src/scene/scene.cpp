@@ -9,6 +9,7 @@
 
 #include "base/require.hpp"
 #include "ricochet/scene/detail/any_scene_system.hpp"
+#include "scene/arcs.hpp"
 #include "scene/motion.hpp"
 #include "scene/names.hpp"
 #include "scene/options.hpp"
@@ -226,6 +227,45 @@ SurfaceId Scene::terrain(const Terrain& terrain)
     return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
 }
 
+SurfaceId Scene::arc(const Arc& arc)
+{
+    const std::string label = arc.name.empty() ? "an arc" : arc.name;
+    require_moderate(arc.centre, "centre of " + label);
+    require_not_negative(who, "radius of " + label, arc.radius);
+    for (const Vector2& end : arc.ends) require_moderate(end, "end of " + label);
+    require_material(arc.material, label);
+    const bool whole = arc.radius > 0;
+    const bool given = arc.ends[0] != arc.ends[1];
+    if (whole == given) {
+        refuse(fmt::format("{} needs either a radius, or two ends that differ; found {}", label,
+                           whole ? "both" : "neither"));
+    }
+    Surface surface;
+    surface.name = arc.name;
+    surface.is_wall = false;
+    surface.material = arc.material;
+    surface.centre = arc.centre;
+    if (whole) {
+        const Vector2 start = arc.centre + Vector2{arc.radius, 0};
+        surface.points = {start, start};
+        surface.radius = arc.radius;
+    } else {
+        const double first = norm(arc.ends[0] - arc.centre);
+        const double second = norm(arc.ends[1] - arc.centre);
+        if (!(first > 0) || !(std::fabs(first - second) <= 1e-9 * first)) {
+            refuse(
+                fmt::format("the ends of {} are {:.17g} and {:.17g} m from its centre; expected "
+                            "equal distances",
+                            label, first, second));
+        }
+        surface.points = {arc.ends[0], arc.ends[1]};
+        surface.radius = 0.5 * (first + second);
+    }
+    take_name(arc.name, "surface");
+    surfaces_.push_back(std::move(surface));
+    return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
+}
+
 void Scene::spring(const Spring& spring)
 {
     for (const BodyId end : spring.between) {
@@ -320,6 +360,7 @@ void Scene::require_outside(const Disc& body, const Surface& surface) const
         }
         return;
     }
+    if (surface.is_arc()) return require_outside_arc(body, surface, label);
     for (std::size_t i = 1; i < surface.points.size(); ++i) {
         const Vector2& a = surface.points[i - 1];
         const double gap = norm(body.at - nearest_on(a, surface.points[i], body.at)) - body.radius;
@@ -330,6 +371,17 @@ void Scene::require_outside(const Disc& body, const Surface& surface) const
                                -gap));
         }
     }
+}
+
+void Scene::require_outside_arc(const Disc& body, const Surface& arc, const std::string& label)
+{
+    const ArcSpan span = ArcSpan::between(arc.centre, arc.points.front(), arc.points.back());
+    const double gap =
+        norm(body.at - nearest_on_arc(arc.centre, arc.radius, span, body.at)) - body.radius;
+    const double slack = rounding_of(body.at, body.radius) + rounding_of(arc.centre, arc.radius);
+    if (gap >= -slack) return;
+    refuse(fmt::format("{} at ({}, {}) lies across {} by {:.3g}", label, body.at[0], body.at[1],
+                       arc.name.empty() ? "an arc" : "\"" + arc.name + "\"", -gap));
 }
 
 std::vector<Vector2> Scene::places_at(double t) const
@@ -379,6 +431,8 @@ void Scene::check_bodies_at(const Surface& surface, std::uint32_t index) const
     for (const Vector2& point : surface.points) {
         rounding = std::max(rounding, rounding_of(point, 0));
     }
+    if (surface.is_arc())
+        rounding = std::max(rounding, rounding_of(surface.centre, surface.radius));
     for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
         if (bodies_[i].radius > 0 && bodies_[i].radius < rounding) {
             refuse(fmt::format(

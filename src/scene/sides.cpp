@@ -10,12 +10,22 @@ namespace {
 
 [[nodiscard]] double height(const Face& face, const Vector2& p) noexcept
 {
+    if (face.kind == Face::Kind::arc) return norm(p - face.at) - face.length;
     return dot(p - face.at, face.normal);
+}
+
+/// The direction in which the height grows at p.
+[[nodiscard]] Vector2 upwards(const Face& face, const Vector2& p) noexcept
+{
+    if (face.kind != Face::Kind::arc) return face.normal;
+    const Vector2 apart = p - face.at;
+    return (1 / norm(apart)) * apart;
 }
 
 [[nodiscard]] double rounding_at(const Face& face, const Vector2& p) noexcept
 {
-    return World::rounding(p, 0) + World::blur(face, 0);
+    const double of_circle = face.kind == Face::Kind::arc ? 8 * epsilon * face.length : 0;
+    return World::rounding(p, 0) + World::blur(face, 0) + of_circle;
 }
 
 /// Whether the chain turns to the side of its normals from one segment to the next, so that the
@@ -40,15 +50,31 @@ bool World::begins_above(const Body& body, std::uint32_t f) const
     }
     // Nothing is known before the first contact: the motion then determines the side, and a point
     // that does not move lies upon the segment.
-    const double rate = dot(body.v, face.normal);
+    const Vector2 up_here = upwards(face, body.p);
+    const double rate = dot(body.v, up_here);
     if (std::fabs(rate) > noise(body.v, {})) return rate > 0;
-    return dot(gravity, face.normal) <= 0;
+    return dot(gravity, up_here) <= 0;
+}
+
+/// A body that reaches an arc comes from the side against which it moves, unless it has just left
+/// it: through the gap of an arc it may have come to the other side.
+bool World::arrives_outside(const Body& body, std::uint32_t f, const Vector2& p,
+                            const Vector2& v) const
+{
+    const Face& face = faces[f];
+    const double up = height(face, p);
+    const double rounding = 4 * rounding_at(face, p);
+    if (body.radius > 0 || std::fabs(up) > rounding) return up > 0;
+    const double rate = dot(v, upwards(face, p));
+    const bool has_moved = norm(p - body.p) > rounding;
+    return has_moved && std::fabs(rate) > noise(v, {}) ? rate < 0 : begins_above(body, f);
 }
 
 bool World::arrives_above(const Body& body, std::uint32_t f, const Vector2& p,
                           const Vector2& v) const
 {
     const Face& face = faces[f];
+    if (face.kind == Face::Kind::arc) return arrives_outside(body, f, p, v);
     if (body.radius > 0) return height(face, p) > 0;
     const bool above = begins_above(body, f);
     const double start = height(face, body.p);
@@ -95,7 +121,7 @@ void World::remember(Body& body, const std::vector<Side>& sides, double flown) c
         for (const Side& side : sides) {
             const double up = height(faces[side.face], body.p);
             if (side.above ? up >= 0 : up <= 0) continue;
-            body.p = body.p - up * faces[side.face].normal;
+            body.p = body.p - up * upwards(faces[side.face], body.p);
             moved = true;
         }
         if (!moved) break;

@@ -61,4 +61,10 @@ namespace ricochet::detail {
     return part <= 0 ? a : part >= 1 ? b : a + part * along;
 }
 
+/// Cross product of two vectors: positive where b points to the left of a.
+[[nodiscard]] inline double cross(const Vector2& a, const Vector2& b) noexcept
+{
+    return a[0] * b[1] - a[1] * b[0];
+}
+
 }  // namespace ricochet::detail

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <set>
 
 #include "scene/islands.hpp"
 #include "scene/large_pages.hpp"
@@ -72,13 +73,16 @@ World::World(const Scene& from, const SceneOptions& with)
         std::uint32_t index = 0;
         for (const Scene::Surface& surface : from.surfaces()) {
             const bool fixed = !detail::moves(surface.motion);
-            if (fixed && surface.is_wall == walls) add_faces(surface, index, faces);
+            if (fixed && surface.is_wall == walls && !surface.is_arc()) {
+                add_faces(surface, index, faces);
+            }
             ++index;
         }
         if (walls) wall_count = static_cast<std::uint32_t>(faces.size());
     }
     join_chains(from, wall_count, faces);
     blur_segments();
+    add_arcs();
     fixed_count = static_cast<std::uint32_t>(faces.size());
     add_moving_faces();
     islands = std::make_unique<Islands>(*this);
@@ -101,6 +105,44 @@ void World::blur_segments()
             if (other != none) face.blur = std::max(face.blur, own(faces[other]));
         }
     }
+}
+
+/// Adds arcs after the segments, with their ends where terrain or another arc does not end there.
+void World::add_arcs()
+{
+    const auto is_arc = [](const Scene::Surface& surface) { return surface.is_arc(); };
+    if (std::ranges::none_of(scene.surfaces(), is_arc)) return;
+    std::set<Vector2> corners;
+    for (const Face& face : faces) {
+        if (face.kind == Face::Kind::vertex) corners.insert(face.at);
+    }
+    std::uint32_t index = 0;
+    for (const Scene::Surface& surface : scene.surfaces()) {
+        const std::uint32_t own = index++;
+        if (!surface.is_arc()) continue;
+        const Vector2& start = surface.points.front();
+        const Vector2& end = surface.points.back();
+        faces.push_back({.kind = Face::Kind::arc,
+                         .at = surface.centre,
+                         .length = surface.radius,
+                         .surface = own,
+                         .material = surface.material.index,
+                         .span = ArcSpan::between(surface.centre, start, end)});
+        if (start == end) continue;
+        for (const Vector2& corner : {start, end}) {
+            if (!corners.insert(corner).second) continue;
+            faces.push_back({.kind = Face::Kind::vertex,
+                             .at = corner,
+                             .surface = own,
+                             .material = surface.material.index});
+        }
+    }
+}
+
+Vector2 nearest_on(const Face& face, const Vector2& p) noexcept
+{
+    if (face.kind == Face::Kind::arc) return nearest_on_arc(face.at, face.length, face.span, p);
+    return nearest_on(face.at, face.at - face.length * turned(face.normal), p);
 }
 
 /// Adds segments with their ends, which need no faces of their own where no point meets them.

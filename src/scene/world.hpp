@@ -15,6 +15,7 @@
 
 #include "ricochet/instant.hpp"
 #include "ricochet/scene/simulate.hpp"
+#include "scene/arcs.hpp"
 #include "scene/motion.hpp"
 #include "scene/options.hpp"
 #include "scene/roots.hpp"
@@ -64,20 +65,24 @@ struct alignas(64) Body {
 };
 static_assert(sizeof(Body) == 128);
 
-/// An obstacle that is no body: a wall, a segment or an end of segments.
+/// An obstacle that is no body: a wall, a segment, an arc, or an end of segments or arcs.
 struct Face {
-    enum class Kind : std::uint8_t { wall, segment, vertex };
+    enum class Kind : std::uint8_t { wall, segment, vertex, arc };
     Kind kind = Kind::wall;
-    Vector2 at{};      ///< point of a wall, start of a segment, vertex
-    Vector2 normal{};  ///< of length 1
-    double length = 0;
+    Vector2 at{};       ///< point of a wall, start of a segment, vertex, centre of an arc
+    Vector2 normal{};   ///< of length 1
+    double length = 0;  ///< of a segment; radius of an arc
     std::uint32_t surface = 0;
     std::uint32_t material = 0;
     std::uint32_t previous = none, next = none;  ///< segments of the same chain
     /// [m] Of a segment: rounding of the distance of a point, with that of the segments that are
     /// linked with it. Their lines meet beside the corner by as much.
     double blur = 0;
+    ArcSpan span{};  ///< of an arc
 };
+
+/// The point of a face of terrain that is nearest to p.
+[[nodiscard]] Vector2 nearest_on(const Face& face, const Vector2& p) noexcept;
 
 /// Gap between a face and a body, and the direction in which the face pushes.
 struct FaceGap {
@@ -186,9 +191,9 @@ struct World {
     /// The direction in which a face pushes a body that slides on it.
     [[nodiscard]] Vector2 push_of(const Body& body, std::uint32_t face) const;
 
-    /// Whether a body is on the side to which a segment's normal points: at the start of its
-    /// record, and at p with velocity v, to which the record has led. A point on the line is on the
-    /// side from which it came, which its record stores.
+    /// Whether a body is on the side to which a segment's normal points, or outside the circle of
+    /// an arc: at the start of its record, and at p with velocity v, to which the record has led. A
+    /// point on the line is on the side from which it came, which its record stores.
     [[nodiscard]] bool begins_above(const Body& body, std::uint32_t face) const;
     [[nodiscard]] bool arrives_above(const Body& body, std::uint32_t face, const Vector2& p,
                                      const Vector2& v) const;
@@ -234,6 +239,9 @@ struct World {
     }
 
 private:
+    [[nodiscard]] bool arrives_outside(const Body& body, std::uint32_t face, const Vector2& p,
+                                       const Vector2& v) const;
+    void add_arcs();
     void blur_segments();
     [[nodiscard]] Vector2 stepped_position(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Vector2 stepped_velocity(std::uint32_t i, const Instant& t) const;

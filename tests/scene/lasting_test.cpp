@@ -270,4 +270,22 @@ TEST(LastingContact, ADumbbellOnTheFloorComesToAnyEnd)
 }
 
 }  // namespace
+TEST(LastingContact, ADiscComesToRestInABowl)
+{
+    // The lower half of the unit circle. Without spin friction holds a disc where the slope is
+    // below its coefficient; the gap is closed to the rounding of the steps' projection, 1e-9 m
+    // here.
+    Scene scene({.gravity = {0, -g}});
+    const MaterialId clay = scene.material({.restitution = 0.4, .friction = 0.2});
+    scene.arc({.name = "bowl", .ends = {{{-1, 0}, {1, 0}}}, .material = clay});
+    scene.disc({.at = {-0.6, -0.2}, .radius = 0.1, .material = clay});
+    const SceneRun run = simulate(scene, {.t_end = 20, .contacts = scene_contacts()});
+    ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+    EXPECT_TRUE(run.bodies[0].asleep);
+    const Vector2& p = run.bodies[0].at;
+    EXPECT_NEAR(std::hypot(p[0], p[1]), 0.9, 1e-9);
+    EXPECT_LE(std::fabs(p[0] / p[1]), 0.2 + 1e-9);
+    EXPECT_LT(p[1], 0);
+}
+
 }  // namespace ricochet::lasting_test

@@ -1,4 +1,4 @@
-// Contents of a scene: discs and points, walls and terrain, springs, gravity and drag.
+// Contents of a scene: discs and points, walls, terrain and arcs, springs, gravity and drag.
 //
 // A `Scene` holds and validates the description; `simulate` (scene/simulate.hpp) runs it. The plane
 // is vertical with gravity, horizontal without. Discs do not spin: friction acts at their centres.
@@ -79,7 +79,7 @@ struct BodyId {
     std::uint32_t index = 0;
     friend bool operator==(BodyId, BodyId) = default;
 };
-/// Handle of a wall or of terrain.
+/// Handle of a wall, of terrain or of an arc.
 struct SurfaceId {
     std::uint32_t index = 0;
     friend bool operator==(SurfaceId, SurfaceId) = default;
@@ -142,6 +142,16 @@ struct Terrain {
     SurfaceMotion motion{};  ///< if it moves, only discs meet it, not points
 };
 
+/// A circle, or the part of one that leads counterclockwise from one point to another. It is met
+/// from both sides and at its ends, and does not move.
+struct Arc {
+    std::string name{};
+    Vector2 centre{};               ///< [m]
+    double radius = 0;              ///< [m] of a whole circle; 0: the arc between `ends`
+    std::array<Vector2, 2> ends{};  ///< [m] its start and its end, equally far from the centre
+    MaterialId material{};
+};
+
 /// A spring between two centres, with tension stiffness (length - rest) + damping d(length)/dt.
 struct Spring {
     std::array<BodyId, 2> between{};
@@ -173,13 +183,14 @@ public:
     /// Adds a part to the scene and returns its handle, if it has one.
     /// @throws std::invalid_argument, with a message that names the part, for a mass or radius that
     /// is not positive, a value that is not finite, a name in use, an unknown handle, a restitution
-    /// outside [0, 1], or a body that lies behind a wall or across terrain added before, unless
-    /// that surface moves.
+    /// outside [0, 1], or a body that lies behind a wall or across terrain or an arc added before,
+    /// unless that surface moves.
     MaterialId material(const Material& material);
     BodyId disc(const Disc& disc);
     BodyId point(const Point& point);
     SurfaceId wall(const Wall& wall);
     SurfaceId terrain(const Terrain& terrain);
+    SurfaceId arc(const Arc& arc);
     void spring(const Spring& spring);
     SystemId system(const SystemBody& system);
 
@@ -207,14 +218,20 @@ public:
     /// The system that a body is a disc of; null for any other body.
     [[nodiscard]] const System* system_of(std::uint32_t body) const noexcept;
 
-    /// A wall, or a terrain. Both kinds are in one list, in the order of their addition.
+    /// A wall, a terrain or an arc. All kinds are in one list, in the order of their addition.
     struct Surface {
         std::string name;
         bool is_wall = true;
-        std::vector<Vector2> points;  ///< one for a wall; closed terrain repeats the first
+        std::vector<Vector2> points;  ///< one for a wall; closed terrain repeats the first; the
+                                      ///< ends of an arc, equal for a circle
         Vector2 normal{};             ///< of a wall, of length 1
         MaterialId material{};
         SurfaceMotion motion{};
+        Vector2 centre{};   ///< [m] of an arc
+        double radius = 0;  ///< [m] of an arc, 0 for other surfaces
+
+        /// Whether it is a circle or an arc.
+        [[nodiscard]] bool is_arc() const noexcept { return radius > 0; }
     };
     [[nodiscard]] std::span<const Surface> surfaces() const noexcept { return surfaces_; }
 
@@ -234,6 +251,7 @@ private:
     /// Centres of all bodies at t [s]: those of systems move with the time, too.
     [[nodiscard]] std::vector<Vector2> places_at(double t) const;
     void require_outside(const Disc& body, const Surface& surface) const;
+    static void require_outside_arc(const Disc& body, const Surface& arc, const std::string& label);
     void check_bodies_at(const Surface& surface, std::uint32_t index) const;
 
     Settings settings_;

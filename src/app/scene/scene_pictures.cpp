@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <numbers>
 #include <string_view>
 #include <vector>
 
@@ -32,6 +33,27 @@ std::vector<Vector2> displacements(const Scene::Surface& surface, const SceneRun
     std::vector<Vector2> out;
     for (const double t : run.sample_times) out.push_back(displacement(surface.motion, t));
     return out;
+}
+
+/// The points of terrain; those of an arc at every third of a degree at least.
+std::vector<Vector2> points_of(const Scene::Surface& surface)
+{
+    if (!surface.is_arc()) return surface.points;
+    constexpr double turn = 2 * std::numbers::pi;
+    const auto angle_of = [&](const Vector2& p) {
+        return std::atan2(p[1] - surface.centre[1], p[0] - surface.centre[0]);
+    };
+    const double from = angle_of(surface.points.front());
+    double sweep = angle_of(surface.points.back()) - from;
+    if (sweep <= 0) sweep += turn;
+    const auto count = static_cast<int>(std::ceil(1080 * sweep / turn));
+    std::vector<Vector2> points;
+    for (int k = 0; k <= count; ++k) {
+        const double angle = from + sweep * k / count;
+        points.push_back({surface.centre[0] + surface.radius * std::cos(angle),
+                          surface.centre[1] + surface.radius * std::sin(angle)});
+    }
+    return points;
 }
 
 /// Widens the frame by the walls along its sides that are near.
@@ -72,7 +94,9 @@ Frame frame_of(const SceneFile& file, const SceneRun& run)
     for (const Scene::Surface& surface : file.scene.surfaces()) {
         if (surface.is_wall) continue;
         for (const Vector2& moved : displacements(surface, run)) {
-            for (const Vector2& p : surface.points) include({p[0] + moved[0], p[1] + moved[1]}, 0);
+            for (const Vector2& p : points_of(surface)) {
+                include({p[0] + moved[0], p[1] + moved[1]}, 0);
+            }
         }
     }
     if (!(frame.low[0] <= frame.high[0])) frame = {{-1, -1}, {1, 1}};
@@ -88,6 +112,7 @@ Frame frame_of(const SceneFile& file, const SceneRun& run)
 /// A displaced surface as a chain of points; for a wall, the part inside the frame.
 std::vector<Vector2> line_of(Scene::Surface surface, const Vector2& moved, const Frame& frame)
 {
+    surface.points = points_of(surface);
     for (Vector2& p : surface.points) p = {p[0] + moved[0], p[1] + moved[1]};
     if (!surface.is_wall) return surface.points;
     const Vector2 along{-surface.normal[1], surface.normal[0]};

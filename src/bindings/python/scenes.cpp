@@ -385,6 +385,17 @@ void bind_parts(py::class_<PyScene, std::shared_ptr<PyScene>>& scene)
                                .motion = motion_from(motion)})
                      .index;
              })
+        .def("arc",
+             [](PyScene& self, const std::string& name, const Vector2& centre, double radius,
+                const std::array<Vector2, 2>& ends, std::uint32_t material) {
+                 return self.scene
+                     .arc({.name = name,
+                           .centre = centre,
+                           .radius = radius,
+                           .ends = ends,
+                           .material = {material}})
+                     .index;
+             })
         .def("spring", [](PyScene& self, std::uint32_t first, std::uint32_t second, double rest,
                           double stiffness, double damping) {
             self.scene.spring({.between = {BodyId{first}, BodyId{second}},
