@@ -257,6 +257,8 @@ class SceneRun:
     trajectory: _Floats
     trajectory_velocities: _Floats
     trajectory_asleep: NDArray[np.bool_]
+    winding: NDArray[np.int32]
+    trajectory_winding: NDArray[np.int32]
     energy: _Floats
     energy_at_end: float
     events: NDArray[np.void]
@@ -266,7 +268,8 @@ class SceneRun:
     def __init__(self, scene: Any, found: dict[str, Any]) -> None: ...
 
 class Scene:
-    def __init__(self, gravity: ArrayLike = (0.0, 0.0), *, memory_limit: float = 4e9) -> None: ...
+    def __init__(self, gravity: ArrayLike = (0.0, 0.0), *, period: ArrayLike = (0.0, 0.0),
+                 memory_limit: float = 4e9) -> None: ...
     @classmethod
     def from_json(cls, text: str, name: str = "scene") -> Scene: ...
     @classmethod

@@ -75,6 +75,8 @@ class SceneRun:
     times, trajectory, trajectory_velocities, trajectory_asleep : ndarray
         ``sample_times`` that were reached, and the states there, shapes (times, bodies, 2) and
         (times, bodies).
+    winding, trajectory_winding : ndarray of int, shapes (bodies, 2) and (times, bodies, 2)
+        Periods that each body has gone along x and y, in a scene with a ``period``; else 0.
     energy : ndarray, shape (times,)
         At ``times``, kinetic and of gravity and springs; ``energy_at_end`` at ``t``.
     events : ndarray, shape (events,)
@@ -92,15 +94,18 @@ class SceneRun:
         self.involved = found["involved"].tolist()
         self.t = found["t"]
         last = found["last"]
-        self.positions, self.velocities, self.asleep = (rows[0] for rows in last)
+        self.positions, self.velocities, self.asleep, self.winding = (rows[0] for rows in last)
         self.times = found["times"]
-        self.trajectory, self.trajectory_velocities, self.trajectory_asleep = found["samples"]
+        (self.trajectory, self.trajectory_velocities, self.trajectory_asleep,
+         self.trajectory_winding) = found["samples"]
         columns = found["events"]
         self.events = np.empty(len(columns["t"]), _EVENT)
         for name, column in columns.items():
             self.events[name] = column
-        self.energy = scene.energy(self.trajectory, self.trajectory_velocities)
-        self.energy_at_end = float(scene.energy(*last[:2])[0])
+        period = np.array(scene._scene.period)
+        self.energy = scene.energy(self.trajectory + self.trajectory_winding * period,
+                                   self.trajectory_velocities)
+        self.energy_at_end = float(scene.energy(last[0] + last[3] * period, last[1])[0])
         self.body_names, self.surface_names = scene.body_names, scene.surface_names
         self.statistics = SimpleNamespace(**found["statistics"])
 
@@ -119,12 +124,14 @@ class Scene:
     ----------
     gravity : (float, float)
         [m/s^2] Default (0, 0).
+    period : (float, float)
+        [m] Lengths of a cell that repeats along x and y; 0, the default: none.
     memory_limit : float
         [bytes] A scene that would need more in a run is refused. Default 4e9.
     """
 
-    def __init__(self, gravity=(0.0, 0.0), *, memory_limit=4e9):
-        self._scene = _scenes().Scene(_pair(gravity, "gravity"),
+    def __init__(self, gravity=(0.0, 0.0), *, period=(0.0, 0.0), memory_limit=4e9):
+        self._scene = _scenes().Scene(_pair(gravity, "gravity"), _pair(period, "period"),
                                       number_from(memory_limit, "memory_limit"))
         self._materials = {None: 0}
 

@@ -21,8 +21,13 @@ public:
     /// whether there are any.
     void size(double side, std::uint32_t buckets_x, std::uint32_t buckets_y, bool points)
     {
-        side_ = side;
-        inverse_ = 1 / side;
+        size({side, side}, buckets_x, buckets_y, points);
+    }
+    /// The same with other sides along x and y.
+    void size(const Vector2& sides, std::uint32_t buckets_x, std::uint32_t buckets_y, bool points)
+    {
+        sides_ = sides;
+        inverse_ = {1 / sides[0], 1 / sides[1]};
         mask_x_ = buckets_x - 1;
         mask_y_ = buckets_y - 1;
         width_ = buckets_x;
@@ -36,15 +41,16 @@ public:
     };
     [[nodiscard]] Cell cell_of(const Vector2& p) const noexcept
     {
-        return {static_cast<std::int64_t>(std::floor(p[0] * inverse_)),
-                static_cast<std::int64_t>(std::floor(p[1] * inverse_))};
+        return {static_cast<std::int64_t>(std::floor(p[0] * inverse_[0])),
+                static_cast<std::int64_t>(std::floor(p[1] * inverse_[1]))};
     }
     [[nodiscard]] std::uint32_t bucket_of(std::int64_t x, std::int64_t y) const noexcept
     {
         return (static_cast<std::uint32_t>(x) & mask_x_) +
                width_ * (static_cast<std::uint32_t>(y) & mask_y_);
     }
-    [[nodiscard]] double side() const noexcept { return side_; }
+    [[nodiscard]] double side() const noexcept { return sides_[0]; }
+    [[nodiscard]] const Vector2& sides() const noexcept { return sides_; }
 
     void insert(std::vector<Body>& bodies, std::uint32_t i, const Cell& cell)
     {
@@ -128,8 +134,8 @@ private:
             count = deeper;
         }
     }
-    double side_ = 1;
-    double inverse_ = 1;
+    Vector2 sides_{1, 1};
+    Vector2 inverse_{1, 1};
     std::uint32_t mask_x_ = 0, mask_y_ = 0, width_ = 1;
     Heads heads_, point_heads_;
 };

@@ -35,7 +35,7 @@ std::string motion_of(const World& world, std::span<const std::uint32_t> group)
 /// The first meeting of two bodies of a group as they move now, as if there were no surfaces.
 std::string first_meeting(const World& world, std::span<const std::uint32_t> group)
 {
-    if (group.size() * group.size() > most_pairs) return "";
+    if (world.periodic || group.size() * group.size() > most_pairs) return "";
     Instant first = no_instant;
     std::uint32_t a = none;
     std::uint32_t b = none;

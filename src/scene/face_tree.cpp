@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 #include <utility>
 
 #include "scene/world.hpp"
@@ -32,29 +31,13 @@ const Face& FaceTree::face(std::uint32_t number) const
     return world_->faces[number];
 }
 
-/// The least square around a face, or around the whole circle of an arc.
-Square FaceTree::box_of(std::uint32_t number) const
-{
-    const Face& of = face(number);
-    if (of.kind == Face::Kind::arc) {
-        const Vector2 reach{of.length, of.length};
-        return {of.at - reach, of.at + reach};
-    }
-    const Vector2 end = of.at - of.length * turned(of.normal);
-    Square box;
-    for (std::size_t c = 0; c < 2; ++c) {
-        std::tie(box.low[c], box.high[c]) = std::minmax(of.at[c], end[c]);
-    }
-    return box;
-}
-
 /// The box around all faces, their largest coordinate and the median of their lengths [m].
 void FaceTree::bound(Square& around, double& largest, double& length) const
 {
     around = {{never, never}, {-never, -never}};
     std::vector<double> lengths;
     for (std::uint32_t f = world_->wall_count; f < world_->fixed_count; ++f) {
-        const Square box = box_of(f);
+        const Square box = box_of(face(f));
         for (std::size_t c = 0; c < 2; ++c) {
             around.low[c] = std::min(around.low[c], box.low[c]);
             around.high[c] = std::max(around.high[c], box.high[c]);
@@ -119,7 +102,7 @@ void FaceTree::add(const Square& square, std::vector<std::uint32_t> faces)
 /// it can.
 bool FaceTree::reaches(std::uint32_t number, const Square& square) const
 {
-    const Square box = box_of(number);
+    const Square box = box_of(face(number));
     for (std::size_t c = 0; c < 2; ++c) {
         if (box.low[c] > square.high[c] + reach_ || box.high[c] < square.low[c] - reach_)
             return false;

@@ -16,11 +16,6 @@ namespace ricochet::detail {
 struct World;
 struct Face;
 
-/// A part of the plane: low <= p < high. Either may be infinite.
-struct Square {
-    Vector2 low{}, high{};
-};
-
 class FaceTree {
 public:
     /// Begins with one square around the terrain of a world that does not move, for bodies of at
@@ -63,7 +58,6 @@ private:
     };
 
     [[nodiscard]] const Face& face(std::uint32_t number) const;
-    [[nodiscard]] Square box_of(std::uint32_t face) const;
     [[nodiscard]] bool reaches(std::uint32_t face, const Square& square) const;
     void bound(Square& around, double& largest, double& length) const;
     void divide(std::uint32_t number);

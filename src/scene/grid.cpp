@@ -225,6 +225,23 @@ Box box_of(const World& world, std::span<const std::uint32_t> members,
     return box;
 }
 
+/// Sides of cells along one axis, and their number.
+struct Repeat {
+    double side = 0;
+    std::uint32_t count = 0;
+};
+
+/// Cells that repeat with a period: a power of two of them, which buckets on a torus fold by
+/// themselves, with sides near the wanted one, and at least `least`. Without a period, as given.
+static Repeat repeat_of(double period, double side, double least, std::uint32_t count)
+{
+    if (!(period > 0)) return {side, count};
+    std::uint32_t cells = fewest_periodic;
+    const double smallest = std::max(least, 0.72 * side);
+    while (cells < (1U << 20) && period / (2.0 * cells) >= smallest) cells *= 2;
+    return {period / cells, cells};
+}
+
 void Grid::size(World& world, std::span<const std::uint32_t> members,
                 std::span<const Vector2> places, bool steps)
 {
@@ -232,8 +249,9 @@ void Grid::size(World& world, std::span<const std::uint32_t> members,
     // Steps are tested only now and then, and may lie a tenth outside their cell.
     const double slack = steps ? 1.3 : 1.0001;
     const double wanted = world.tuning.big_above;
-    const double ordinary =
-        std::isnan(wanted) ? largest_ordinary(world, members, box, slack) : wanted;
+    const double ordinary = world.periodic       ? never
+                            : std::isnan(wanted) ? largest_ordinary(world, members, box, slack)
+                                                 : wanted;
     Box small{.extent = box.extent};
     Mixture mixture;
     double taken = 0;
@@ -266,7 +284,13 @@ void Grid::size(World& world, std::span<const std::uint32_t> members,
     rings_.size(cells_, small.largest, play * side, steps ? 0.1 * side : 0);
     const std::uint32_t least = some_big ? power_above(rings_.across(cells_, box.largest)) : 4;
     const auto [columns, rows] = buckets(box.extent, side, box.count, least);
-    cells_.size(side, columns, rows, points);
+    if (world.periodic) {
+        const Repeat x = repeat_of(world.period[0], side, 2 * small.largest * slack, columns);
+        const Repeat y = repeat_of(world.period[1], side, 2 * small.largest * slack, rows);
+        cells_.size({x.side, y.side}, x.count, y.count, points);
+    } else {
+        cells_.size(side, columns, rows, points);
+    }
     find_cells_away(world, 1.001 * small.largest + 0.15 * side);
     if (some_big) size_big(world, members, box);
 }
@@ -294,7 +318,8 @@ void Grid::find_cells_away(const World& world, double reach)
         const std::size_t along = wall.normal[0] != 0 ? 0 : 1;
         const bool slanted = wall.normal[1 - along] != 0;
         const bool from_below = wall.normal[along] > 0;
-        const double edge = (wall.at[along] + (from_below ? reach : -reach)) / cells_.side();
+        const double edge =
+            (wall.at[along] + (from_below ? reach : -reach)) / cells_.sides()[along];
         if (slanted || !(std::fabs(edge) < static_cast<double>(far))) {
             away_ = {{0, 0}, {-1, -1}};
             return;

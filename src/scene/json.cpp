@@ -168,10 +168,11 @@ public:
     SceneFile read(const json& whole)
     {
         const Part top(whole, {}, "a scene");
-        top.only({"gravity", "memory_limit", "materials", "bodies", "walls", "terrain", "arcs",
-                  "springs", "run"});
+        top.only({"gravity", "period", "memory_limit", "materials", "bodies", "walls", "terrain",
+                  "arcs", "springs", "run"});
         Scene::Settings settings;
         top.vector("gravity", settings.gravity);
+        top.vector("period", settings.period);
         top.number("memory_limit", settings.memory_limit);
         SceneFile file{top.ask([&] { return Scene(settings); }), {}};
         materials(top, file.scene);

@@ -183,6 +183,32 @@ Meeting meet_curved(const World& world, std::uint32_t i, std::uint32_t j)
     return meeting;
 }
 
+Meeting meet_image(const World& world, std::uint32_t i, std::uint32_t j, const Instant& now)
+{
+    const Body& a = world.bodies[i];
+    const Body& b = world.bodies[j];
+    const double reach = a.radius + b.radius;
+    if (reach == 0) return {};
+    const Vector2 shift = world.image_shift(world.position(i, now) - world.position(j, now));
+    const Instant& from = later(a.t, b.t);
+    const Path first = world.path(i, from);
+    const Path second = world.path(j, from);
+    Path path = difference(first, second);
+    path.c[0] = (first.c[0] - second.c[0]) - shift;
+    const double rounding =
+        World::rounding(first.c[0], reach) + World::rounding(second.c[0], reach);
+    const Squares at = squares(path.c[0], path.c[1], reach, rounding);
+    const double slowest = noise(first.c[1], second.c[1]) * reach;
+    if (at.at_once <= at.tolerance && std::fabs(at.rate) <= slowest) {
+        const double bend = dot(path.c[1], path.c[1]) + 2 * dot(path.c[0], path.c[2]);
+        if (path.degree > 1 && bend < 0) return {.from = from, .after = 0, .presses = true};
+        if (path.degree <= 1) return {};
+    }
+    if (path.degree <= 1) return {.from = from, .after = straight(at, path.c[0], path.c[1], reach)};
+    const Polynomial gap = squared(path, at);
+    return {.from = from, .after = falls_within(gap, 2 * path.degree, path.until, at.tolerance)};
+}
+
 /// [m] Distance beyond its ends up to which a segment is met: that of `World::leads_off` for discs,
 /// so that no disc leaves a segment before it is on the next one.
 static double slack_of(const Face& face, double radius, const Vector2& p, double flown = 0)

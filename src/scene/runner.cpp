@@ -241,7 +241,7 @@ void Runner::sample_until(const Instant& t, bool inclusive, Samples& samples)
         if (inclusive ? before(t, at) : !before(at, t)) return;
         auto& row = samples[next_sample_];
         for (const std::uint32_t i : members_) {
-            row[i] = {world_.position(i, at), world_.velocity(i, at), world_.bodies[i].asleep};
+            row[i] = world_.state(i, at);
         }
     }
 }
@@ -359,7 +359,7 @@ void Runner::consider_body(std::uint32_t i, std::uint32_t j)
     if (j == i) return;
     const std::uint32_t group = world_.bodies[i].contact;
     if (group != none && group == world_.bodies[j].contact) return;
-    consider(i, meet(world_, i, j), false, j);
+    consider(i, meeting(i, j), false, j);
 }
 
 void Runner::consider_faces(std::uint32_t i)
@@ -382,6 +382,7 @@ void Runner::predict(std::uint32_t i)
         if (celled_) offer(i);
     } else {
         if (!body.mapped) {
+            if (world_.periodic) consider_border(i);
             consider_own(i);
             consider_walls(i);
         }
@@ -404,7 +405,7 @@ void Runner::offer(std::uint32_t i)
 {
     grid_.each_near(world_.bodies, i, pending_[i].cell, [&](std::uint32_t j) {
         if (j == i || world_.bodies[j].asleep) return;
-        consider(j, meet(world_, j, i), false, i);
+        consider(j, meeting(j, i), false, i);
         put_in_calendar(j);
     });
 }
@@ -572,6 +573,51 @@ void Runner::leave_square(std::uint32_t i)
     put_in_calendar(i);
 }
 
+/// Predicts when a body leaves the cell that repeats: from its record alone.
+void Runner::consider_border(std::uint32_t i)
+{
+    const Body& body = world_.bodies[i];
+    Pending& pending = pending_[i];
+    for (std::uint32_t c = 0; c < 2; ++c) {
+        const double period = world_.period[c];
+        if (period == 0) continue;
+        for (const bool up : {false, true}) {
+            const double sign = up ? -1 : 1;
+            const double gap = up ? period - body.p[c] : body.p[c];
+            const double after = falls_after(gap, sign * body.v[c], sign * body.a[c], 0);
+            if (!(after < never)) continue;
+            const Instant t = body.t.after(after);
+            if (!before(t, pending.t)) continue;
+            pending.t = t;
+            pending.kind = Pending::Kind::border;
+            pending.other = 2 * c + (up ? 1 : 0);
+        }
+    }
+}
+
+/// Takes a body that has left the cell to its image on the other side, and counts the period.
+void Runner::cross_border(std::uint32_t i)
+{
+    ++world_.statistics.crossings;
+    Body& body = world_.bodies[i];
+    const std::uint32_t c = pending_[i].other / 2;
+    const bool up = pending_[i].other % 2 != 0;
+    const double s = seconds(body.t, now_);
+    body.p = place(body, s);
+    body.v = speed(body, s);
+    body.t = now_;
+    body.p[c] += up ? -world_.period[c] : world_.period[c];
+    world_.windings[i][c] += up ? 1 : -1;
+    ++body.version;
+    body.sides.fill(none);
+    if (body.held != none && world_.faces[body.held].kind != Face::Kind::wall) {
+        body.held = none;  // an image of the face holds it now, once it presses on it
+        body.a = world_.gravity;
+    }
+    move_to_cell(i);
+    predict(i);
+}
+
 std::string Runner::presses_on(std::uint32_t i, const Face& face) const
 {
     return fmt::format("{} presses on {}{}", called(i),
@@ -587,6 +633,7 @@ void Runner::happen(std::uint32_t i)
         case Kind::nothing: return predict(i);
         case Kind::stop: return halt(i);
         case Kind::edge: return leave_edge(i);
+        case Kind::border: return cross_border(i);
         case Kind::face: return impact(i);
         case Kind::presses_face:
             if (!world_.moves(pending.other) && rests_on_face(i)) return predict(i);

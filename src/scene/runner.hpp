@@ -72,7 +72,16 @@ public:
 private:
     void begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events);
     struct Pending {
-        enum class Kind : std::uint8_t { nothing, pair, face, presses, presses_face, stop, edge };
+        enum class Kind : std::uint8_t {
+            nothing,
+            pair,
+            face,
+            presses,
+            presses_face,
+            stop,
+            edge,
+            border,  ///< leaves the cell that repeats, on side `other`: 2 axis + (whether upwards)
+        };
         Instant t = no_instant;
         Instant crossing = no_instant;
         std::uint32_t other = none;
@@ -116,6 +125,12 @@ private:
     void consider_faces(std::uint32_t i);
     void consider_moving(std::uint32_t i);
     void consider_own(std::uint32_t i);
+    void consider_border(std::uint32_t i);
+    void cross_border(std::uint32_t i);
+    [[nodiscard]] Meeting meeting(std::uint32_t i, std::uint32_t j) const
+    {
+        return world_.periodic ? meet_image(world_, i, j, now_) : meet(world_, i, j);
+    }
     void offer(std::uint32_t i);
     [[nodiscard]] Exit exit_of(std::uint32_t i, const Square& square, double outside) const;
     [[nodiscard]] Exit exit_by_step(std::uint32_t i, const Square& square, double outside) const;

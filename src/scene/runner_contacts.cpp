@@ -104,6 +104,11 @@ void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::stri
                                 "SceneOptions::contacts",
                                 sentence));
     }
+    if (world_.periodic) {
+        return fail(Outcome::zeno, bodies,
+                    fmt::format("{}: lasting contact is not followed in a scene with a period",
+                                sentence.empty() ? called(bodies.front()) : sentence));
+    }
     patience_.resize(world_.bodies.size());
     std::vector<std::uint32_t> members = contacts_.closure(bodies);
     for (const std::uint32_t i : members) {

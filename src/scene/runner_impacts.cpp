@@ -220,7 +220,8 @@ void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
         if (j == i) return;
         const Body& b = world_.bodies[j];
         if (j != sure && !b.quartic) {
-            const Vector2 near = p - place(b, seconds(b.t, now_));
+            Vector2 near = p - place(b, seconds(b.t, now_));
+            if (world_.periodic) near = near - world_.image_shift(near);
             const double limit = a.radius + b.radius + slack;
             if (dot(near, near) > limit * limit) return;
         }
@@ -243,7 +244,8 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     }
     const Vector2 pa = world_.position(i, now_);
     const Vector2 pb = world_.position(j, now_);
-    const Vector2 apart = pa - pb;
+    Vector2 apart = pa - pb;
+    if (world_.periodic) apart = apart - world_.image_shift(apart);
     const double distance = norm(apart);
     const Vector2 normal{apart[0] / distance, apart[1] / distance};
     const Vector2 va = cluster_.before[slot];
@@ -255,7 +257,7 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     Contact contact{.a = i, .b = j, .surface = false, .slot_a = slot};
     contact.slot_b = slot_of(j);
     contact.normal = normal;
-    contact.at = 0.5 * (pa + pb);
+    contact.at = world_.periodic ? world_.between_images(pa, pb) : 0.5 * (pa + pb);
     contact.blur = (World::rounding(pa, reach) + World::rounding(pb, reach)) / reach;
     contact.restitution = world_.restitution(a.material, b.material);
     contact.friction = world_.friction(a.material, b.material);

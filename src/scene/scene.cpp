@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -90,12 +91,56 @@ void require_apart(const Scene& scene, const std::vector<Vector2>& places)
     }
 }
 
+/// Refuses bodies that overlap with an image of another one across the border of the cell.
+void require_apart_across(const Scene& scene, double largest)
+{
+    const Vector2& period = scene.settings().period;
+    const auto bodies = scene.bodies();
+    const std::size_t along = period[0] > 0 ? 0 : 1;
+    struct Image {
+        double at = 0;
+        std::uint32_t body = 0;
+    };
+    std::vector<Image> order;
+    for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+        const double at = bodies[i].at[along];
+        order.push_back({at, i});
+        if (at <= 2 * largest) order.push_back({at + period[along], i});
+    }
+    std::ranges::sort(order, {},
+                      [](const Image& image) { return std::pair(image.at, image.body); });
+    for (std::size_t k = 0; k < order.size(); ++k) {
+        for (std::size_t l = k + 1; l < order.size(); ++l) {
+            if (order[l].at - order[k].at > 2 * largest) break;
+            const auto [first, second] = std::minmax(order[k].body, order[l].body);
+            if (first == second) continue;
+            Vector2 apart = bodies[first].at - bodies[second].at;
+            for (std::size_t c = 0; c < 2; ++c) {
+                if (period[c] > 0) apart[c] -= period[c] * std::nearbyint(apart[c] / period[c]);
+            }
+            const double reach = bodies[first].radius + bodies[second].radius;
+            const double overlap = reach - norm(apart);
+            if (reach == 0 ||
+                overlap <= rounding_of(bodies[first].at, bodies[first].radius) +
+                               rounding_of(bodies[second].at, bodies[second].radius)) {
+                continue;
+            }
+            throw Misplaced(
+                fmt::format("Scene: {} and {} overlap by {:.3g} at the start, across the "
+                            "border of the period",
+                            scene.name_of(BodyId{first}), scene.name_of(BodyId{second}), overlap),
+                second);
+        }
+    }
+}
+
 }  // namespace
 
 Scene::Scene(const Settings& settings) : settings_(settings)
 {
     require_vector(settings.gravity, "gravity");
     require_positive(who, "memory_limit", settings.memory_limit);
+    for (const double length : settings.period) require_not_negative(who, "period", length);
     materials_.push_back({.name = "", .restitution = 1, .friction = 0});
 }
 
@@ -399,6 +444,63 @@ std::vector<Vector2> Scene::places_at(double t) const
     return places;
 }
 
+/// Requires that everything fits the cell that repeats.
+void Scene::check_period() const
+{
+    const Vector2& period = settings_.period;
+    constexpr std::array axes{"x", "y"};
+    double largest = 0;
+    for (const Disc& body : bodies_) largest = std::max(largest, body.radius);
+    const auto refuse_all = [](std::string_view what) {
+        refuse(fmt::format("a scene with a period has no {}, and there are some", what));
+    };
+    const auto slowed = [](const Disc& body) { return body.drag > 0; };
+    if (!springs_.empty()) refuse_all("springs");
+    if (!systems_.empty()) refuse_all("systems");
+    if (std::ranges::any_of(bodies_, slowed)) refuse_all("bodies with drag");
+    for (std::size_t c = 0; c < 2; ++c) {
+        if (period[c] == 0) continue;
+        const double least = bodies_.size() > 1 ? 8.01 * largest : 2.01 * largest;
+        if (period[c] < least) {
+            refuse(
+                fmt::format("the period along {} is {:g} m, and the largest radius {:g} m; "
+                            "expected a period of {:g} m at least",
+                            axes[c], period[c], largest, least));
+        }
+        for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+            const double at = bodies_[i].at[c];
+            if (at >= 0 && at < period[c]) continue;
+            throw Misplaced(fmt::format("Scene: {} is at {} = {:g} m; expected 0 <= {} < {:g}, the "
+                                        "period",
+                                        name_of(BodyId{i}), axes[c], at, axes[c], period[c]),
+                            i);
+        }
+        for (std::uint32_t s = 0; s < surfaces_.size(); ++s) {
+            const Surface& surface = surfaces_[s];
+            if (surface.is_wall) {
+                if (surface.normal[c] == 0) continue;
+                refuse(
+                    fmt::format("{} is a wall across {}, along which the scene has a period; "
+                                "expected terrain, or a normal along the other axis",
+                                name_of(SurfaceId{s}), axes[c]));
+            }
+            if (moves(surface.motion)) {
+                refuse(fmt::format("{} is terrain that moves, which a scene with a period has not",
+                                   name_of(SurfaceId{s})));
+            }
+            const auto inside = [&](const Vector2& p) { return p[c] >= 0 && p[c] <= period[c]; };
+            const bool fits = surface.is_arc() ? inside(surface.centre)
+                                               : std::ranges::all_of(surface.points, inside);
+            if (fits && surface.radius < period[c] / 2) continue;
+            refuse(
+                fmt::format("{} does not lie in 0 <= {} <= {:g}, the period; an arc may cross the "
+                            "border if its centre lies there and its radius is less than half",
+                            name_of(SurfaceId{s}), axes[c], period[c]));
+        }
+    }
+    if (bodies_.size() > 1) require_apart_across(*this, largest);
+}
+
 void Scene::check(double t_start) const
 {
     for (std::uint32_t s = 0; s < surfaces_.size(); ++s) {
@@ -419,6 +521,7 @@ void Scene::check(double t_start) const
         }
         check_bodies_at(surface, s);
     }
+    if (!is_zero(settings_.period)) check_period();
     const std::vector<Vector2> places =
         systems_.empty() ? std::vector<Vector2>{} : places_at(t_start);
     require_apart(*this, places);

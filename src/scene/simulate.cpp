@@ -108,7 +108,7 @@ SceneRun run_until(const Scene& scene, const SceneOptions& options, const SceneT
     reserve_large(run.bodies, world.bodies.size());
     run.bodies.resize(world.bodies.size());
     for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
-        run.bodies[i] = {world.position(i, end), world.velocity(i, end), world.bodies[i].asleep};
+        run.bodies[i] = world.state(i, end);
     }
     for (std::uint32_t k = 0; k < world.islands->count(); ++k) {
         if (world.islands->is_system(k)) run.systems.push_back(world.islands->state(k, end));
@@ -257,8 +257,10 @@ double energy(const Scene& scene, const std::vector<BodyState>& bodies)
     for (std::size_t i = 0; i < bodies.size(); ++i) {
         if (scene.system_of(static_cast<std::uint32_t>(i))) continue;
         const double mass = scene.bodies()[i].mass;
+        const Vector2& period = scene.settings().period;
+        const Vector2 gone{bodies[i].winding[0] * period[0], bodies[i].winding[1] * period[1]};
         sum += mass * (0.5 * dot(bodies[i].velocity, bodies[i].velocity) -
-                       dot(scene.settings().gravity, bodies[i].at));
+                       dot(scene.settings().gravity, bodies[i].at + gone));
     }
     for (const Spring& spring : scene.springs()) {
         const double length =

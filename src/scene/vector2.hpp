@@ -10,6 +10,11 @@
 
 namespace ricochet::detail {
 
+/// A part of the plane: low <= p < high. Either may be infinite.
+struct Square {
+    Vector2 low{}, high{};
+};
+
 [[nodiscard]] inline Vector2 operator+(const Vector2& a, const Vector2& b) noexcept
 {
     return {a[0] + b[0], a[1] + b[1]};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <set>
+#include <tuple>
 
 #include "scene/islands.hpp"
 #include "scene/large_pages.hpp"
@@ -53,8 +54,9 @@ void add_faces(const Scene::Surface& surface, std::uint32_t index, std::vector<F
 }  // namespace
 
 World::World(const Scene& from, const SceneOptions& with)
-    : scene(from), options(with), gravity(from.settings().gravity)
+    : scene(from), options(with), gravity(from.settings().gravity), period(from.settings().period)
 {
+    periodic = !is_zero(period);
     const Instant start{with.t_start, 0};
     reserve_large(bodies, from.bodies().size());
     for (const Disc& disc : from.bodies()) {
@@ -83,6 +85,7 @@ World::World(const Scene& from, const SceneOptions& with)
     join_chains(from, wall_count, faces);
     blur_segments();
     add_arcs();
+    if (periodic) add_images();
     fixed_count = static_cast<std::uint32_t>(faces.size());
     add_moving_faces();
     islands = std::make_unique<Islands>(*this);
@@ -135,6 +138,64 @@ void World::add_arcs()
                              .at = corner,
                              .surface = own,
                              .material = surface.material.index});
+        }
+    }
+}
+
+Square box_of(const Face& face) noexcept
+{
+    if (face.kind == Face::Kind::arc) {
+        const Vector2 reach{face.length, face.length};
+        return {face.at - reach, face.at + reach};
+    }
+    const Vector2 end = face.at - face.length * turned(face.normal);
+    Square box;
+    for (std::size_t c = 0; c < 2; ++c) {
+        std::tie(box.low[c], box.high[c]) = std::minmax(face.at[c], end[c]);
+    }
+    return box;
+}
+
+/// Whether a body of radius `reach` with its centre in the cell that repeats can touch a box.
+static bool reaches_cell(const Square& box, const Vector2& period, double reach)
+{
+    for (std::size_t c = 0; c < 2; ++c) {
+        if (period[c] == 0) continue;
+        const double most = reach + 1e-9 * period[c];
+        if (box.high[c] < -most || box.low[c] > period[c] + most) return false;
+    }
+    return true;
+}
+
+/// Adds the images of terrain in the neighbouring cells that a body in the cell can touch.
+void World::add_images()
+{
+    windings.resize(bodies.size());
+    double reach = 0;
+    for (const Body& body : bodies) reach = std::max(reach, body.radius);
+    reach *= 1.001;
+    const auto count = static_cast<std::uint32_t>(faces.size());
+    const std::array<int, 3> steps{-1, 0, 1};
+    for (const int x : steps) {
+        for (const int y : steps) {
+            if ((x == 0 && y == 0) || (x != 0 && period[0] == 0) || (y != 0 && period[1] == 0)) {
+                continue;
+            }
+            const Vector2 shift{x * period[0], y * period[1]};
+            std::vector<std::uint32_t> image(count, none);
+            for (std::uint32_t f = wall_count; f < count; ++f) {
+                Face face = faces[f];
+                face.at = face.at + shift;
+                if (!reaches_cell(box_of(face), period, reach)) continue;
+                image[f] = static_cast<std::uint32_t>(faces.size());
+                faces.push_back(face);
+            }
+            for (std::uint32_t f = wall_count; f < count; ++f) {
+                if (image[f] == none) continue;
+                Face& face = faces[image[f]];
+                if (face.previous != none) face.previous = image[face.previous];
+                if (face.next != none) face.next = image[face.next];
+            }
         }
     }
 }

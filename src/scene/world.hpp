@@ -84,6 +84,9 @@ struct Face {
 /// The point of a face of terrain that is nearest to p.
 [[nodiscard]] Vector2 nearest_on(const Face& face, const Vector2& p) noexcept;
 
+/// The least box around a face, or around the whole circle of an arc.
+[[nodiscard]] Square box_of(const Face& face) noexcept;
+
 /// Gap between a face and a body, and the direction in which the face pushes.
 struct FaceGap {
     double gap = never;
@@ -133,6 +136,9 @@ struct World {
     SceneTuning tuning;
     bool keeps_events = true;  ///< where they are recorded: not only for the observer
     Vector2 gravity{};
+    Vector2 period{};       ///< [m] 0 along an axis that does not repeat
+    bool periodic = false;  ///< whether one of them repeats
+    std::vector<std::array<std::int32_t, 2>> windings;  ///< of bodies, where it is
     std::vector<Body> bodies;
     struct Bend {
         Vector2 c3{}, c4{};  ///< terms of degree 3 and 4
@@ -159,6 +165,37 @@ struct World {
         const Vector2& sweep = bends[i].sweep;
         return (1 + 1e-9) *
                (std::fabs(direction[0]) * sweep[0] + std::fabs(direction[1]) * sweep[1]);
+    }
+
+    /// What is added to a place so that its difference from another one, `apart`, is that of the
+    /// nearest images.
+    [[nodiscard]] Vector2 image_shift(const Vector2& apart) const noexcept
+    {
+        Vector2 shift{};
+        for (std::size_t c = 0; c < 2; ++c) {
+            if (period[c] > 0) shift[c] = period[c] * std::nearbyint(apart[c] / period[c]);
+        }
+        return shift;
+    }
+    /// The middle between the nearest images of two places, in the cell that repeats. It does not
+    /// depend on the order of the two.
+    [[nodiscard]] Vector2 between_images(const Vector2& a, const Vector2& b) const noexcept
+    {
+        const Vector2 shift = image_shift(a - b);
+        Vector2 middle = 0.5 * ((a + b) + shift);
+        for (std::size_t c = 0; c < 2; ++c) {
+            if (shift[c] == 0) continue;
+            const double other = 0.5 * ((a[c] + b[c]) - shift[c]);
+            if (other >= 0 && other < period[c]) middle[c] = other;
+        }
+        return middle;
+    }
+    /// The state of a body at t.
+    [[nodiscard]] BodyState state(std::uint32_t i, const Instant& t) const
+    {
+        BodyState state{position(i, t), velocity(i, t), bodies[i].asleep};
+        if (periodic) state.winding = windings[i];
+        return state;
     }
 
     /// From its record; by the method's own map where it advances by steps.
@@ -242,6 +279,7 @@ private:
     [[nodiscard]] bool arrives_outside(const Body& body, std::uint32_t face, const Vector2& p,
                                        const Vector2& v) const;
     void add_arcs();
+    void add_images();
     void blur_segments();
     [[nodiscard]] Vector2 stepped_position(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Vector2 stepped_velocity(std::uint32_t i, const Instant& t) const;
@@ -365,6 +403,10 @@ struct Squares {
     return {.from = from, .after = straight(now, dp, dv, reach)};
 }
 [[nodiscard]] Meeting meet_face(const World& world, std::uint32_t i, std::uint32_t face);
+
+/// Meeting of the images of two bodies that are nearest to each other now.
+[[nodiscard]] Meeting meet_image(const World& world, std::uint32_t i, std::uint32_t j,
+                                 const Instant& now);
 
 /// Gap between a face and a body that its flight has led to p.
 [[nodiscard]] FaceGap face_gap(const Face& face, const Body& body, const Vector2& p, bool above,

@@ -172,7 +172,10 @@ class Scene {
 public:
     /// Settings of a whole scene.
     struct Settings {
-        Vector2 gravity{};          ///< [m/s^2]
+        Vector2 gravity{};  ///< [m/s^2]
+        /// [m] Lengths of a cell that repeats along x and y; 0: none. Bodies are in 0 <= x <
+        /// period.
+        Vector2 period{};
         double memory_limit = 4e9;  ///< [bytes] a scene that would need more in a run is refused
     };
 
@@ -251,6 +254,7 @@ private:
     /// Centres of all bodies at t [s]: those of systems move with the time, too.
     [[nodiscard]] std::vector<Vector2> places_at(double t) const;
     void require_outside(const Disc& body, const Surface& surface) const;
+    void check_period() const;
     static void require_outside_arc(const Disc& body, const Surface& arc, const std::string& label);
     void check_bodies_at(const Surface& surface, std::uint32_t index) const;
 

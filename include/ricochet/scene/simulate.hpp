@@ -98,6 +98,8 @@ struct BodyState {
     Vector2 at{};         ///< [m]
     Vector2 velocity{};   ///< [m/s]
     bool asleep = false;  ///< at rest, and stays so until it is struck
+    /// Periods that the body has gone along x and y: it has come to `at` + winding * period.
+    std::array<std::int32_t, 2> winding{};
 };
 
 /// Counts over a run.
@@ -146,7 +148,7 @@ struct SceneRun {
 [[nodiscard]] std::string explain(const Scene& scene, const SceneOptions& options);
 
 /// Energy [J] of the bodies that are not part of systems: kinetic, and potential of gravity and
-/// springs. `bodies` holds one state for each body of the scene.
+/// springs, at places that count the periods gone. `bodies` holds one state for each body.
 [[nodiscard]] double energy(const Scene& scene, const std::vector<BodyState>& bodies);
 
 // Lasting contact of the bodies of a scene: stacks, sleeping bodies that lean on each other, chains

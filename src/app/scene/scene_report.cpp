@@ -44,12 +44,19 @@ std::string other_of(const Scene& scene, const SceneEvent& event)
                                   : scene.name_of(BodyId{event.other.index});
 }
 
+bool is_periodic(const Scene& scene)
+{
+    return scene.settings().period != Vector2{};
+}
+
 Json state_of(const Scene& scene, std::uint32_t i, const BodyState& state)
 {
-    return {{"name", scene.name_of(BodyId{i})},
-            {"at", state.at},
-            {"velocity", state.velocity},
-            {"asleep", state.asleep}};
+    Json out{{"name", scene.name_of(BodyId{i})},
+             {"at", state.at},
+             {"velocity", state.velocity},
+             {"asleep", state.asleep}};
+    if (is_periodic(scene)) out["winding"] = state.winding;
+    return out;
 }
 
 Json states_of(const Scene& scene, const std::vector<BodyState>& states)
@@ -173,13 +180,16 @@ std::string scene_csv(const SceneFile& file, const SceneRun& run)
 {
     fmt::memory_buffer out;
     const auto to = std::back_inserter(out);
-    fmt::format_to(to, "t,body,x,y,vx,vy,asleep\n");
+    const bool periodic = is_periodic(file.scene);
+    fmt::format_to(to, "t,body,x,y,vx,vy,asleep{}\n", periodic ? ",winding_x,winding_y" : "");
     for (std::size_t k = 0; k < run.samples.size(); ++k) {
         for (std::uint32_t i = 0; i < run.samples[k].size(); ++i) {
             const BodyState& b = run.samples[k][i];
-            fmt::format_to(to, "{},{},{},{},{},{},{}\n", run.sample_times[k],
+            fmt::format_to(to, "{},{},{},{},{},{},{}", run.sample_times[k],
                            csv_cell(file.scene.name_of(BodyId{i})), b.at[0], b.at[1], b.velocity[0],
                            b.velocity[1], static_cast<int>(b.asleep));
+            if (periodic) fmt::format_to(to, ",{},{}", b.winding[0], b.winding[1]);
+            fmt::format_to(to, "\n");
         }
     }
     if (run.outcome == Outcome::cancelled) fmt::format_to(to, "{}", incomplete_line());

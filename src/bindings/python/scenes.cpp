@@ -237,7 +237,8 @@ template <class Of>
         "after"_a = pairs(events, 2, [](const SceneEvent& e) { return e.after.data(); }));
 }
 
-/// States of all bodies at some times: positions, velocities, and whether they sleep.
+/// States of all bodies at some times: positions, velocities, whether they sleep, and the periods
+/// that they have gone.
 [[nodiscard]] py::tuple states_of(const std::vector<std::vector<BodyState>>& rows,
                                   std::size_t bodies)
 {
@@ -246,17 +247,20 @@ template <class Of>
     py::array at = new_array<double>({times, count, 2});
     py::array velocity = new_array<double>({times, count, 2});
     py::array asleep = new_array<bool>({times, count});
+    py::array winding = new_array<std::int32_t>({times, count, 2});
     auto* x = static_cast<double*>(at.mutable_data());
     auto* v = static_cast<double*>(velocity.mutable_data());
     auto* sleeps = static_cast<bool*>(asleep.mutable_data());
+    auto* gone = static_cast<std::int32_t*>(winding.mutable_data());
     for (const auto& row : rows) {
         for (const BodyState& body : row) {
             x = std::ranges::copy(body.at, x).out;
             v = std::ranges::copy(body.velocity, v).out;
             *sleeps++ = body.asleep;
+            gone = std::ranges::copy(body.winding, gone).out;
         }
     }
-    return py::make_tuple(at, velocity, asleep);
+    return py::make_tuple(at, velocity, asleep, winding);
 }
 
 [[nodiscard]] py::dict counts_of(const SceneStatistics& s)
@@ -421,9 +425,9 @@ PYBIND11_MODULE(_scenes, module)
         }
     });
     py::class_<PyScene, std::shared_ptr<PyScene>> scene(module, "Scene");
-    scene.def(py::init([](const Vector2& gravity, double memory_limit) {
-        return std::make_shared<PyScene>(
-            PyScene{Scene({.gravity = gravity, .memory_limit = memory_limit}), {}});
+    scene.def(py::init([](const Vector2& gravity, const Vector2& period, double memory_limit) {
+        return std::make_shared<PyScene>(PyScene{
+            Scene({.gravity = gravity, .period = period, .memory_limit = memory_limit}), {}});
     }));
     bind_parts(scene);
     scene
@@ -452,6 +456,8 @@ PYBIND11_MODULE(_scenes, module)
                                    }
                                    return names;
                                })
+        .def_property_readonly("period",
+                               [](const PyScene& self) { return self.scene.settings().period; })
         .def_property_readonly("radii",
                                [](const PyScene& self) {
                                    std::vector<double> radii;
