@@ -158,16 +158,24 @@ class Scene:
         """Reads a scene from a JSON file; ValueError also where the file cannot be read."""
         return cls._of(_scenes().load_scene(os.fspath(path)))
 
-    def material(self, name, *, restitution=1.0, friction=0.0):
+    def material(self, name, *, restitution=1.0, friction=0.0, by_speed=None):
         """Adds a material, by whose name bodies and surfaces refer to it.
 
         At a contact the smaller restitution, in [0, 1], and the smaller coefficient of friction apply.
-        Without a material a body is elastic and smooth.
+        Without a material a body is elastic and smooth. ``by_speed``, in place of a constant:
+        ``{"speed": v, "exponent": p}`` for 1 - (1 - restitution) (approach / v)^p below v, or
+        ``{"speeds": [...], "restitutions": [...]}``, linear between them.
         """
         if not isinstance(name, str) or not name:
             raise TypeError(f"name: found {name!r}, expected a text")
         self._materials[name] = self._scene.material(
-            name, number_from(restitution, "restitution"), number_from(friction, "friction"))
+            name, number_from(restitution, "restitution"), number_from(friction, "friction"), by_speed)
+
+    def pair(self, first, second, *, restitution=1.0, friction=0.0, by_speed=None):
+        """Says what applies where two materials touch, in place of the smaller coefficients of both."""
+        self._scene.pair(self._material(first), self._material(second),
+                         number_from(restitution, "restitution"), number_from(friction, "friction"),
+                         by_speed)
 
     def _material(self, name):
         if name not in self._materials:
@@ -191,19 +199,22 @@ class Scene:
                                  number_from(mass, "mass"), number_from(drag, "drag"),
                                  self._material(material))
 
-    def wall(self, point, normal, *, material=None, motion=None, name=None):
+    def wall(self, point, normal, *, material=None, motion=None, temperature=0.0, name=None):
         """Adds a wall through ``point``, whose ``normal`` points towards the bodies.
 
         Returns its number among the surfaces. ``motion`` is a dictionary:
         ``{"amplitude": (x, y), "frequency": hertz, "phase": rad}``, ``{"velocity": (x, y), "since":
         t}``, ``{"times": [...], "displacements": [(x, y), ...]}``, or functions of t that return
         pairs, ``{"displacement": f, "velocity": df, "acceleration_bound": a}``, also with
-        ``speed_bound`` and ``reach``.
+        ``speed_bound`` and ``reach``. ``temperature`` [J], kT of a thermal wall: bodies leave it with a
+        velocity at random, by the ``seed`` of the run.
         """
         return self._scene.wall(_text(name), _pair(point, "point"), _pair(normal, "normal"),
-                                self._material(material), motion)
+                                self._material(material), motion,
+                                number_from(temperature, "temperature"))
 
-    def terrain(self, points, *, closed=False, material=None, motion=None, name=None):
+    def terrain(self, points, *, closed=False, material=None, motion=None, temperature=0.0,
+                name=None):
         """Adds a chain of segments between ``points``, shape (n, 2), which is met from both sides.
 
         ``closed``: the last point is joined to the first. Returns its number among the surfaces.
@@ -212,9 +223,11 @@ class Scene:
         if ends.ndim != 2 or ends.shape[1] != 2:
             raise ValueError(f"points: found shape {ends.shape}, expected (n, 2)")
         return self._scene.terrain(_text(name), ends.tolist(), bool(closed),
-                                   self._material(material), motion)
+                                   self._material(material), motion,
+                                   number_from(temperature, "temperature"))
 
-    def arc(self, centre, *, radius=None, start=None, end=None, material=None, name=None):
+    def arc(self, centre, *, radius=None, start=None, end=None, material=None, temperature=0.0,
+            name=None):
         """Adds a circle of this ``radius``, or the part of one that leads counterclockwise from
         ``start`` to ``end``; both are met from both sides. Returns its number among the surfaces.
         """
@@ -226,7 +239,7 @@ class Scene:
         if radius is not None and not size > 0:
             raise ValueError(f"arc: found radius={radius!r}, expected a positive number")
         return self._scene.arc(_text(name), _pair(centre, "centre"), size, ends,
-                               self._material(material))
+                               self._material(material), number_from(temperature, "temperature"))
 
     def _number(self, body):
         if isinstance(body, str):
@@ -274,7 +287,7 @@ class Scene:
         Options: ``t_start``, ``sample_times``, ``rtol`` and ``atol`` (of bodies with springs or
         drag), ``impacts`` ("waves", or "together": Newton's law for all contacts of a cluster at once),
         ``elastic_within`` [s], ``contact_step`` [s] (of groups in lasting contact), ``record_events``,
-        ``max_events``. ValueError for a scene that cannot start, naming the bodies that overlap.
+        ``max_events``, ``seed`` (of thermal walls). ValueError for a scene that cannot start, naming the bodies that overlap.
         """
         return SceneRun(self, self._scene.simulate(self._options(t_end, options)))
 

@@ -232,10 +232,11 @@ Groups groups_of(const World& world)
     groups.order_.resize(world.bodies.size());
     std::iota(groups.order_.begin(), groups.order_.end(), 0U);
     const bool terrain = world.faces.size() > world.wall_count;
-    if (terrain || world.periodic || !world.scene.systems().empty() || world.options.observe) {
-        // Terrain lies in the squares of a group, moving surfaces and systems may drive bodies
-        // anywhere, and images are everywhere: all bodies are one group. An observer sees the
-        // events of all in their order.
+    const bool driven = world.periodic || world.any_thermal;
+    if (terrain || driven || !world.scene.systems().empty() || world.options.observe) {
+        // Terrain lies in the squares of a group, moving surfaces, thermal ones and systems may
+        // drive bodies anywhere, and images are everywhere: all bodies are one group. An observer
+        // sees the events of all in their order.
         groups.ends_ = {world.bodies.size()};
         return groups;
     }

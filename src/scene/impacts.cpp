@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "scene/gauss.hpp"
+#include "scene/thermal.hpp"
 
 namespace ricochet::detail {
 
@@ -122,6 +123,39 @@ void Impacts::strike(Cluster& cluster, Contact& contact) const
         push(cluster, contact, contact.impulse * contact.normal + contact.tangential * tangent);
     } else {
         push(cluster, contact, contact.impulse * contact.normal);
+    }
+}
+
+/// Sends a body away from a thermal surface, with a velocity at random relative to it.
+void Impacts::strike_thermal(Cluster& cluster, Contact& contact) const
+{
+    Vector2& v = cluster.after[contact.slot_a];
+    MixedRandom random(world_.options.seed);
+    random.mix(t_);
+    for (const double number : {contact.at[0], contact.at[1], v[0], v[1]}) random.mix(number);
+    const double inverse = world_.bodies[contact.a].inverse_mass;
+    const Vector2 leaves = leaving_velocity(random, contact.temperature * inverse);
+    const Vector2 tangent = turned(contact.normal);
+    const Vector2 after =
+        contact.surface_velocity + leaves[0] * contact.normal + leaves[1] * tangent;
+    contact.impulse = dot(after - v, contact.normal) / inverse;
+    contact.tangential = dot(after - v, tangent) / inverse;
+    v = after;
+}
+
+/// Where laws are not constant: restitutions at the present speeds of approach, and a thermal
+/// contact alone, before the others of its wave.
+void Impacts::apply_laws(Cluster& cluster)
+{
+    for (const std::uint32_t k : struck_) {
+        Contact& contact = cluster.contacts[k];
+        if (contact.temperature > 0) {
+            struck_ = {k};
+            return;
+        }
+        if (!contact.by_speed) continue;
+        contact.restitution = world_.restitution(contact.materials[0], contact.materials[1],
+                                                 approach(cluster, contact));
     }
 }
 
@@ -335,8 +369,13 @@ bool Impacts::wave(Cluster& cluster)
         const bool fast = u >= fastest * (1 - tie - contact.blur) && u > rounding;
         if (together || fast) struck_.push_back(k);
     }
+    if (!world_.plain_laws) apply_laws(cluster);
     ++world_.statistics.waves;
     before_wave_ = cluster.after;
+    if (cluster.contacts[struck_[0]].temperature > 0) {
+        strike_thermal(cluster, cluster.contacts[struck_[0]]);
+        return true;
+    }
     const auto rubs = [&] { return cluster.contacts[struck_[0]].friction > 0; };
     if (struck_.size() == 1 && (cluster.couplings.empty() || !rubs())) {
         strike(cluster, cluster.contacts[struck_[0]]);
@@ -398,6 +437,7 @@ bool Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneE
         contact.mass = contact.tangential_mass = 1 / inverse;
     }
     if (!cluster.couplings.empty()) set_masses(cluster);
+    t_ = t;
     const std::size_t each = cluster.lasting ? lasting_patience : patience;
     const std::size_t most = each * cluster.contacts.size();
     cluster.fastest = 0;

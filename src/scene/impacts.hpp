@@ -24,8 +24,11 @@ struct Contact {
     double target = 0;  ///< [m/s] required separation
     double mass = 0;    ///< effective, along the normal and across
     double tangential_mass = 0;
-    bool moving = false;         ///< whether its surface moves
-    Vector2 surface_velocity{};  ///< [m/s]
+    bool by_speed = false;   ///< whether restitution depends on the speed of approach
+    double temperature = 0;  ///< [J] of a thermal surface
+    std::array<std::uint32_t, 2> materials{};  ///< where it does
+    bool moving = false;                       ///< whether its surface moves
+    Vector2 surface_velocity{};                ///< [m/s]
 };
 
 /// Velocity of body a relative to the body or face that it touches; `v` are the cluster's
@@ -90,6 +93,8 @@ private:
     void push_coupled(Cluster& cluster, const Contact& contact, const Vector2& impulse) const;
     void set_masses(Cluster& cluster) const;
     void strike(Cluster& cluster, Contact& contact) const;
+    void strike_thermal(Cluster& cluster, Contact& contact) const;
+    void apply_laws(Cluster& cluster);
     void solve(Cluster& cluster) const;
     void solve_without_gain(Cluster& cluster);
     [[nodiscard]] double kinetic_energy(const Cluster& cluster) const;
@@ -102,6 +107,7 @@ private:
     void emit(const Cluster& cluster, double t, std::vector<SceneEvent>* events);
 
     World& world_;
+    double t_ = 0;                       ///< [s] of the cluster
     std::vector<std::uint32_t> struck_;  ///< contacts of the current wave
     std::vector<Vector2> before_wave_;
     std::vector<Vector2> impulses_before_;

@@ -168,14 +168,17 @@ public:
     SceneFile read(const json& whole)
     {
         const Part top(whole, {}, "a scene");
-        top.only({"gravity", "period", "memory_limit", "materials", "bodies", "walls", "terrain",
-                  "arcs", "springs", "run"});
+        top.only({"gravity", "period", "memory_limit", "materials", "pairs", "bodies", "walls",
+                  "terrain", "arcs", "springs", "run"});
         Scene::Settings settings;
         top.vector("gravity", settings.gravity);
         top.vector("period", settings.period);
         top.number("memory_limit", settings.memory_limit);
         SceneFile file{top.ask([&] { return Scene(settings); }), {}};
         materials(top, file.scene);
+        top.each("pairs", [&](const json& value, const JsonPath& path) {
+            pair({value, path, "a pair"}, file.scene);
+        });
         top.each("walls", [&](const json& value, const JsonPath& path) {
             wall({value, path, "a wall"}, file.scene);
         });
@@ -219,23 +222,74 @@ private:
             const Part part(item.value(), path, "a material");
             part.only({"restitution", "friction"});
             Material material{.name = item.key()};
-            part.number("restitution", material.restitution);
+            material.by_speed = restitution_of(part, material.restitution);
             part.number("friction", material.friction);
             materials_.emplace(item.key(), part.ask([&] { return scene.material(material); }));
         }
+    }
+
+    /// Reads a number, or an object that says how restitution depends on the speed.
+    [[nodiscard]] static SpeedLaw restitution_of(const Part& of, double& restitution)
+    {
+        if (!of.has("restitution")) return {};
+        if (!of.at("restitution").is_object()) {
+            of.number("restitution", restitution);
+            return {};
+        }
+        const Part part = of.part("restitution", "a restitution");
+        if (part.has("speeds") || part.has("restitutions")) {
+            part.only({"speeds", "restitutions"});
+            TableOfSpeed table;
+            for (auto [key, to] : {std::pair("speeds", &table.speeds),
+                                   std::pair("restitutions", &table.restitutions)}) {
+                static_cast<void>(part.at(key));
+                part.each(key, [&, name = key, list = to](const json& value, const JsonPath&) {
+                    if (!value.is_number()) part.expected("numbers", name, value);
+                    list->push_back(value.get<double>());
+                });
+            }
+            return table;
+        }
+        part.only({"above", "speed", "exponent", "speeds", "restitutions"});
+        PowerOfSpeed power;
+        restitution = part.number("above");
+        power.speed = part.number("speed");
+        part.number("exponent", power.exponent);
+        return power;
+    }
+
+    void pair(const Part& part, Scene& scene) const
+    {
+        part.only({"between", "restitution", "friction"});
+        const json& ends = part.at("between");
+        if (!ends.is_array() || ends.size() != 2 || !ends[0].is_string() || !ends[1].is_string()) {
+            part.expected("two names of materials", "between", ends);
+        }
+        MaterialPair pair;
+        for (std::size_t k = 0; k < 2; ++k) {
+            pair.between[k] = material_named(part, "between", ends[k].get<std::string>());
+        }
+        pair.by_speed = restitution_of(part, pair.restitution);
+        part.number("friction", pair.friction);
+        part.ask([&] { scene.pair(pair); });
+    }
+
+    [[nodiscard]] MaterialId material_named(const Part& part, std::string_view key,
+                                            const std::string& name) const
+    {
+        const auto found = materials_.find(name);
+        if (found != materials_.end()) return found->second;
+        std::vector<std::string> known;
+        for (const auto& [one, id] : materials_) known.push_back(one);
+        part.fail_at(key,
+                     fmt::format("there is no material \"{}\"{}", name, nearest_name(name, known)));
     }
 
     [[nodiscard]] MaterialId material_of(const Part& part) const
     {
         std::string name;
         part.text("material", name);
-        if (!part.has("material")) return {};
-        const auto found = materials_.find(name);
-        if (found != materials_.end()) return found->second;
-        std::vector<std::string> known;
-        for (const auto& [key, id] : materials_) known.push_back(key);
-        part.fail_at("material",
-                     fmt::format("there is no material \"{}\"{}", name, nearest_name(name, known)));
+        return part.has("material") ? material_named(part, "material", name) : MaterialId{};
     }
 
     [[nodiscard]] static SurfaceMotion motion_of(const Part& of)
@@ -276,17 +330,18 @@ private:
 
     void wall(const Part& part, Scene& scene) const
     {
-        part.only({"name", "point", "normal", "material", "motion"});
+        part.only({"name", "point", "normal", "material", "motion", "temperature"});
         Wall wall{.point = part.vector("point"), .normal = part.vector("normal")};
         part.text("name", wall.name);
         wall.material = material_of(part);
         wall.motion = motion_of(part);
+        part.number("temperature", wall.temperature);
         part.ask([&] { return scene.wall(wall); });
     }
 
     void terrain(const Part& part, Scene& scene) const
     {
-        part.only({"name", "points", "closed", "material", "motion"});
+        part.only({"name", "points", "closed", "material", "motion", "temperature"});
         Terrain terrain;
         part.text("name", terrain.name);
         part.truth("closed", terrain.closed);
@@ -296,12 +351,13 @@ private:
         });
         terrain.material = material_of(part);
         terrain.motion = motion_of(part);
+        part.number("temperature", terrain.temperature);
         part.ask([&] { return scene.terrain(terrain); });
     }
 
     void arc(const Part& part, Scene& scene) const
     {
-        part.only({"name", "centre", "radius", "from", "to", "material"});
+        part.only({"name", "centre", "radius", "from", "to", "material", "temperature"});
         Arc arc{.centre = part.vector("centre")};
         part.text("name", arc.name);
         if (part.has("radius") == (part.has("from") || part.has("to"))) {
@@ -316,6 +372,7 @@ private:
             arc.ends = {part.vector("from"), part.vector("to")};
         }
         arc.material = material_of(part);
+        part.number("temperature", arc.temperature);
         part.ask([&] { return scene.arc(arc); });
     }
 
@@ -402,7 +459,7 @@ private:
     static void run(const Part& part, SceneOptions& options)
     {
         part.only({"t_start", "t_end", "rtol", "atol", "impacts", "elastic_within", "contact_step",
-                   "sample_times", "max_events", "record_events"});
+                   "sample_times", "max_events", "record_events", "seed"});
         part.number("t_start", options.t_start);
         part.number("t_end", options.t_end);
         part.number("rtol", options.rtol);
@@ -413,6 +470,11 @@ private:
             const json& most = part.at("max_events");
             if (!most.is_number_unsigned()) part.expected("a whole number", "max_events", most);
             options.max_events = most.get<std::uint64_t>();
+        }
+        if (part.has("seed")) {
+            const json& seed = part.at("seed");
+            if (!seed.is_number_unsigned()) part.expected("a whole number", "seed", seed);
+            options.seed = seed.get<std::uint64_t>();
         }
         if (part.has("record_events")) {
             const json& kept = part.at("record_events");

@@ -191,6 +191,7 @@ private:
     [[nodiscard]] double loose_motion(std::uint32_t face, double size) const;
     [[nodiscard]] std::vector<Side> sides_of(std::uint32_t i, std::uint32_t sure) const;
     void gather_pairs(std::uint32_t slot, std::uint32_t sure);
+    void set_laws(Contact& contact, std::uint32_t a, std::uint32_t b) const;
     void try_pair(std::uint32_t slot, std::uint32_t j, bool sure);
     std::uint32_t slot_of(std::uint32_t body);
     void apply(bool struck);

@@ -144,6 +144,7 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         }
         contact.restitution = world_.restitution(body.material, world_.faces[f].material);
         contact.friction = world_.friction(body.material, world_.faces[f].material);
+        if (!world_.plain_laws) set_laws(contact, body.material, world_.faces[f].material);
         cluster_.contacts.push_back(contact);
     };
     const double near = body.radius + 1e-6 * (body.radius + norm(p));
@@ -210,6 +211,15 @@ double Runner::loose_motion(std::uint32_t face, double size) const
     return loose * size + 0.125 * world_.moving(face).bounds.acceleration * h * h;
 }
 
+/// Notes laws of a contact that are not constants.
+void Runner::set_laws(Contact& contact, std::uint32_t a, std::uint32_t b) const
+{
+    contact.by_speed = world_.depends_on_speed(a, b);
+    contact.materials = {a, b};
+    if (!contact.surface) return;
+    contact.temperature = world_.scene.surfaces()[world_.faces[contact.b].surface].temperature;
+}
+
 void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
 {
     const std::uint32_t i = cluster_.bodies[slot];
@@ -261,6 +271,7 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
     contact.blur = (World::rounding(pa, reach) + World::rounding(pb, reach)) / reach;
     contact.restitution = world_.restitution(a.material, b.material);
     contact.friction = world_.friction(a.material, b.material);
+    if (!world_.plain_laws) set_laws(contact, a.material, b.material);
     cluster_.contacts.push_back(contact);
 }
 
@@ -347,6 +358,7 @@ void Runner::resolve_cluster(std::uint32_t i)
             };
             if (recent(contact.a) || (!contact.surface && recent(contact.b))) {
                 contact.restitution = 1;
+                contact.by_speed = false;
             }
         }
     }

@@ -11,6 +11,7 @@
 #include "base/require.hpp"
 #include "ricochet/scene/detail/any_scene_system.hpp"
 #include "scene/arcs.hpp"
+#include "scene/materials.hpp"
 #include "scene/motion.hpp"
 #include "scene/names.hpp"
 #include "scene/options.hpp"
@@ -182,12 +183,35 @@ void Scene::require_material(MaterialId material, std::string_view of) const
 MaterialId Scene::material(const Material& material)
 {
     const std::string label = fmt::format("material \"{}\": ", material.name);
-    require(material.restitution >= 0 && material.restitution <= 1, who, label + "restitution",
-            "lie in [0, 1]", material.restitution);
-    require_not_negative(who, label + "friction", material.friction);
+    check_coefficients(material.restitution, material.friction, material.by_speed, label);
     take_name(material.name, "material");
     materials_.push_back(material);
     return {static_cast<std::uint32_t>(materials_.size() - 1)};
+}
+
+/// The same for both orders of two materials.
+static std::uint64_t key_of(std::uint32_t a, std::uint32_t b)
+{
+    const auto [first, second] = std::minmax(a, b);
+    return std::uint64_t{first} << 32 | second;
+}
+
+void Scene::pair(const MaterialPair& pair)
+{
+    for (const MaterialId material : pair.between) require_material(material, "a pair");
+    const auto [a, b] = std::pair(pair.between[0].index, pair.between[1].index);
+    const std::string label =
+        fmt::format("pair of \"{}\" and \"{}\": ", materials_[a].name, materials_[b].name);
+    check_coefficients(pair.restitution, pair.friction, pair.by_speed, label);
+    const auto number = static_cast<std::uint32_t>(pairs_.size());
+    if (!pair_numbers_.emplace(key_of(a, b), number).second) refuse(label + "it is given twice");
+    pairs_.push_back(pair);
+}
+
+const MaterialPair* Scene::pair_of(std::uint32_t a, std::uint32_t b) const noexcept
+{
+    const auto found = pair_numbers_.find(key_of(a, b));
+    return found == pair_numbers_.end() ? nullptr : &pairs_[found->second];
 }
 
 BodyId Scene::add(const Disc& body, std::string_view kind)
@@ -238,13 +262,15 @@ SurfaceId Scene::wall(const Wall& wall)
     if (!(length > 0) || !std::isfinite(length)) refuse("the normal of a wall has no length");
     require_material(wall.material, "a wall");
     check_motion(wall.motion, wall.name.empty() ? "a wall" : wall.name);
+    require_not_negative(who, "temperature of a wall", wall.temperature);
     take_name(wall.name, "surface");
     surfaces_.push_back({.name = wall.name,
                          .is_wall = true,
                          .points = {wall.point},
                          .normal = {wall.normal[0] / length, wall.normal[1] / length},
                          .material = wall.material,
-                         .motion = wall.motion});
+                         .motion = wall.motion,
+                         .temperature = wall.temperature});
     return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
 }
 
@@ -256,6 +282,7 @@ SurfaceId Scene::terrain(const Terrain& terrain)
     for (const Vector2& point : terrain.points) require_vector(point, "point of terrain");
     require_material(terrain.material, "terrain");
     check_motion(terrain.motion, terrain.name.empty() ? "terrain" : terrain.name);
+    require_not_negative(who, "temperature of terrain", terrain.temperature);
     std::vector<Vector2> points = terrain.points;
     if (terrain.closed) points.push_back(points.front());
     for (std::size_t i = 1; i < points.size(); ++i) {
@@ -268,7 +295,8 @@ SurfaceId Scene::terrain(const Terrain& terrain)
                          .is_wall = false,
                          .points = std::move(points),
                          .material = terrain.material,
-                         .motion = terrain.motion});
+                         .motion = terrain.motion,
+                         .temperature = terrain.temperature});
     return {static_cast<std::uint32_t>(surfaces_.size() - 1)};
 }
 
@@ -279,6 +307,7 @@ SurfaceId Scene::arc(const Arc& arc)
     require_not_negative(who, "radius of " + label, arc.radius);
     for (const Vector2& end : arc.ends) require_moderate(end, "end of " + label);
     require_material(arc.material, label);
+    require_not_negative(who, "temperature of " + label, arc.temperature);
     const bool whole = arc.radius > 0;
     const bool given = arc.ends[0] != arc.ends[1];
     if (whole == given) {
@@ -290,6 +319,7 @@ SurfaceId Scene::arc(const Arc& arc)
     surface.is_wall = false;
     surface.material = arc.material;
     surface.centre = arc.centre;
+    surface.temperature = arc.temperature;
     if (whole) {
         const Vector2 start = arc.centre + Vector2{arc.radius, 0};
         surface.points = {start, start};

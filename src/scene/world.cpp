@@ -7,6 +7,7 @@
 
 #include "scene/islands.hpp"
 #include "scene/large_pages.hpp"
+#include "scene/materials.hpp"
 #include "scene/moving.hpp"
 
 namespace ricochet::detail {
@@ -88,12 +89,44 @@ World::World(const Scene& from, const SceneOptions& with)
     if (periodic) add_images();
     fixed_count = static_cast<std::uint32_t>(faces.size());
     add_moving_faces();
+    find_laws();
     islands = std::make_unique<Islands>(*this);
     if (islands->count() > 0) bends.resize(bodies.size());
     put_to_sleep();
 }
 
 World::~World() = default;
+
+void World::find_laws()
+{
+    const auto by_speed = [](const auto& law) { return detail::depends_on_speed(law.by_speed); };
+    plain_laws = std::ranges::none_of(scene.materials(), by_speed) &&
+                 std::ranges::none_of(scene.pairs(), by_speed);
+    any_thermal = std::ranges::any_of(
+        scene.surfaces(), [](const Scene::Surface& surface) { return surface.temperature > 0; });
+    plain_laws = plain_laws && !any_thermal;
+}
+
+double World::restitution(std::uint32_t a, std::uint32_t b, double speed) const
+{
+    if (const MaterialPair* pair = scene.pair_of(a, b)) {
+        return restitution_at(pair->by_speed, pair->restitution, speed);
+    }
+    const auto of = [&](std::uint32_t material) {
+        const Material& one = scene.materials()[material];
+        return restitution_at(one.by_speed, one.restitution, speed);
+    };
+    return std::min(of(a), of(b));
+}
+
+bool World::depends_on_speed(std::uint32_t a, std::uint32_t b) const noexcept
+{
+    if (const MaterialPair* pair = scene.pair_of(a, b)) {
+        return detail::depends_on_speed(pair->by_speed);
+    }
+    return detail::depends_on_speed(scene.materials()[a].by_speed) ||
+           detail::depends_on_speed(scene.materials()[b].by_speed);
+}
 
 void World::blur_segments()
 {

@@ -205,12 +205,27 @@ struct World {
     [[nodiscard]] Vector2 heading(std::uint32_t i, const Instant& t) const;
     [[nodiscard]] Path path(std::uint32_t i, const Instant& t) const;
 
+    /// Whether restitution is constant and no wall is thermal.
+    bool plain_laws = true;
+    bool any_thermal = false;
+
+    /// Of two materials; where it depends on the speed of approach, that of high speeds.
     [[nodiscard]] double restitution(std::uint32_t a, std::uint32_t b) const noexcept
     {
+        if (!scene.pairs().empty()) {
+            if (const MaterialPair* pair = scene.pair_of(a, b)) return pair->restitution;
+        }
         return std::min(scene.materials()[a].restitution, scene.materials()[b].restitution);
     }
+    /// The same at a speed of approach [m/s].
+    [[nodiscard]] double restitution(std::uint32_t a, std::uint32_t b, double speed) const;
+    /// Whether it depends on that speed.
+    [[nodiscard]] bool depends_on_speed(std::uint32_t a, std::uint32_t b) const noexcept;
     [[nodiscard]] double friction(std::uint32_t a, std::uint32_t b) const noexcept
     {
+        if (!scene.pairs().empty()) {
+            if (const MaterialPair* pair = scene.pair_of(a, b)) return pair->friction;
+        }
         return std::min(scene.materials()[a].friction, scene.materials()[b].friction);
     }
 
@@ -278,6 +293,7 @@ struct World {
 private:
     [[nodiscard]] bool arrives_outside(const Body& body, std::uint32_t face, const Vector2& p,
                                        const Vector2& v) const;
+    void find_laws();
     void add_arcs();
     void add_images();
     void blur_segments();

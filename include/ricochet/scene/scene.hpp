@@ -95,12 +95,45 @@ namespace detail {
 class SceneSystem;
 }
 
+/// Restitution that falls with the speed of approach v up to `speed`, and is constant above it:
+/// e(v) = 1 - (1 - e) (v / speed)^exponent, with the e of the material or pair. The exponent is 1/5
+/// for viscoelastic spheres to leading order (R. Ramirez et al., Coefficient of restitution of
+/// colliding viscoelastic spheres, Physical Review E 60, 1999), and 3/4 in models of shaken grains.
+struct PowerOfSpeed {
+    double speed = 1;        ///< [m/s] positive
+    double exponent = 0.75;  ///< positive
+};
+
+/// Restitutions at given speeds of approach, linear between them, constant below and above.
+struct TableOfSpeed {
+    std::vector<double> speeds{};        ///< [m/s] strictly ascending, not negative, at least one
+    std::vector<double> restitutions{};  ///< in [0, 1], one for each speed
+};
+
+/// How restitution depends on the speed of approach [m/s]: not, by a power or a table, or by a
+/// function without side effects, whose values are clamped to [0, 1].
+using SpeedLaw =
+    std::variant<std::monostate, PowerOfSpeed, TableOfSpeed, std::function<double(double)>>;
+
+/// Restitution at a speed of approach [m/s] of a law whose coefficient is `restitution`.
+[[nodiscard]] double restitution_at(const SpeedLaw& law, double restitution, double speed);
+
 /// Material of bodies and surfaces. At a contact the smaller of the two restitutions and the
-/// smaller of the two coefficients of friction apply. `MaterialId{}` is elastic and frictionless.
+/// smaller of the two coefficients of friction apply, unless the scene has a `MaterialPair` for the
+/// two. `MaterialId{}` is elastic and frictionless.
 struct Material {
     std::string name{};      ///< may be empty
     double restitution = 1;  ///< Newton's coefficient, in [0, 1]
     double friction = 0;     ///< Coulomb's coefficient
+    SpeedLaw by_speed{};     ///< in place of a constant restitution
+};
+
+/// Coefficients where two materials, or two parts of one material, touch.
+struct MaterialPair {
+    std::array<MaterialId, 2> between{};
+    double restitution = 1;
+    double friction = 0;
+    SpeedLaw by_speed{};
 };
 
 /// A disc without spin.
@@ -131,6 +164,9 @@ struct Wall {
     Vector2 normal{};  ///< of any length except zero; points towards the bodies
     MaterialId material{};
     SurfaceMotion motion{};
+    /// [J] Of a thermal wall: a body that strikes it leaves with a velocity at random, as from a
+    /// gas with this kT. 0: an ordinary wall.
+    double temperature = 0;
 };
 
 /// A chain of segments, met from both sides.
@@ -140,6 +176,7 @@ struct Terrain {
     bool closed = false;            ///< whether the last point is joined to the first
     MaterialId material{};
     SurfaceMotion motion{};  ///< if it moves, only discs meet it, not points
+    double temperature = 0;  ///< [J] as of a wall
 };
 
 /// A circle, or the part of one that leads counterclockwise from one point to another. It is met
@@ -150,6 +187,7 @@ struct Arc {
     double radius = 0;              ///< [m] of a whole circle; 0: the arc between `ends`
     std::array<Vector2, 2> ends{};  ///< [m] its start and its end, equally far from the centre
     MaterialId material{};
+    double temperature = 0;  ///< [J] as of a wall
 };
 
 /// A spring between two centres, with tension stiffness (length - rest) + damping d(length)/dt.
@@ -189,6 +227,7 @@ public:
     /// outside [0, 1], or a body that lies behind a wall or across terrain or an arc added before,
     /// unless that surface moves.
     MaterialId material(const Material& material);
+    void pair(const MaterialPair& pair);
     BodyId disc(const Disc& disc);
     BodyId point(const Point& point);
     SurfaceId wall(const Wall& wall);
@@ -210,6 +249,9 @@ public:
     [[nodiscard]] std::span<const Disc> bodies() const noexcept { return bodies_; }
     [[nodiscard]] std::span<const Material> materials() const noexcept { return materials_; }
     [[nodiscard]] std::span<const Spring> springs() const noexcept { return springs_; }
+    [[nodiscard]] std::span<const MaterialPair> pairs() const noexcept { return pairs_; }
+    /// The pair of these materials, in either order; null where there is none.
+    [[nodiscard]] const MaterialPair* pair_of(std::uint32_t a, std::uint32_t b) const noexcept;
 
     /// A system. Its discs are among `bodies()`; the mass given there has no meaning.
     struct System {
@@ -230,8 +272,9 @@ public:
         Vector2 normal{};             ///< of a wall, of length 1
         MaterialId material{};
         SurfaceMotion motion{};
-        Vector2 centre{};   ///< [m] of an arc
-        double radius = 0;  ///< [m] of an arc, 0 for other surfaces
+        Vector2 centre{};        ///< [m] of an arc
+        double temperature = 0;  ///< [J] 0 where it is not thermal
+        double radius = 0;       ///< [m] of an arc, 0 for other surfaces
 
         /// Whether it is a circle or an arc.
         [[nodiscard]] bool is_arc() const noexcept { return radius > 0; }
@@ -263,6 +306,8 @@ private:
     std::vector<Disc> bodies_;
     std::vector<Surface> surfaces_;
     std::vector<Spring> springs_;
+    std::vector<MaterialPair> pairs_;
+    std::unordered_map<std::uint64_t, std::uint32_t> pair_numbers_;
     std::vector<System> systems_;
     std::unordered_map<std::string, std::uint32_t> names_;
 };

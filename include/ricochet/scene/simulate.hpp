@@ -77,6 +77,10 @@ struct SceneOptions {
     /// collapse of a dissipative hard-sphere gas with the TC model, Granular Matter 1, 1998).
     double elastic_within = 0;
 
+    /// Of the velocities with which bodies leave thermal walls. They follow from it and from the
+    /// time, place and velocity of each impact, so that labels and samples change nothing.
+    std::uint64_t seed = 1;
+
     /// `scene_contacts()` of `ricochet::scene_contact`. Without it a run ends with `Outcome::zeno`
     /// where bodies stay in contact with each other.
     const SceneContacts* contacts = nullptr;

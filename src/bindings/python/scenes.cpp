@@ -36,7 +36,8 @@ struct PyScene {
 }
 
 /// @throws py::value_error for a key that the motion does not have
-void refuse_others(const py::dict& given, std::initializer_list<std::string_view> known)
+void refuse_others(const py::dict& given, std::initializer_list<std::string_view> known,
+                   const std::string& whose = "motion")
 {
     for (const auto& [key, value] : given) {
         const auto name = py::cast<std::string>(key);
@@ -44,20 +45,22 @@ void refuse_others(const py::dict& given, std::initializer_list<std::string_view
         std::string all;
         for (const std::string_view one : known)
             all += (all.empty() ? "" : ", ") + std::string(one);
-        throw py::value_error("motion: found '" + name + "', expected some of " + all);
+        throw py::value_error(whose + ": found '" + name + "', expected some of " + all);
     }
 }
 
 template <class T>
-void put(const py::dict& given, const char* key, T& to)
+void put(const py::dict& given, const char* key, T& to, const std::string& whose = "motion")
 {
     if (!has(given, key)) return;
     try {
         to = py::cast<T>(given[key]);
     } catch (const py::cast_error&) {
-        throw py::type_error("motion: " + std::string(key) + ": found " +
+        throw py::type_error(whose + ": " + std::string(key) + ": found " +
                              py::cast<std::string>(py::repr(given[key])) + ", expected " +
-                             (std::is_same_v<T, double> ? "a number" : "pairs of numbers"));
+                             (std::is_same_v<T, double>                ? "a number"
+                              : std::is_same_v<T, std::vector<double>> ? "numbers"
+                                                                       : "pairs of numbers"));
     }
 }
 
@@ -133,6 +136,30 @@ using Along = std::function<Vector2(double)>;
                           ", expected a key 'amplitude', 'velocity', 'times' or 'displacement'");
 }
 
+/// How restitution depends on the speed: None, {"speed": v, "exponent": p}, or {"speeds": [...],
+/// "restitutions": [...]}.
+[[nodiscard]] SpeedLaw law_from(const py::object& given)
+{
+    if (given.is_none()) return {};
+    if (!py::isinstance<py::dict>(given)) {
+        throw py::type_error("by_speed: found " + py::cast<std::string>(py::repr(given)) +
+                             ", expected a dictionary");
+    }
+    const py::dict of(given);
+    if (has(of, "speeds")) {
+        refuse_others(of, {"speeds", "restitutions"}, "by_speed");
+        TableOfSpeed table;
+        put(of, "speeds", table.speeds, "by_speed");
+        put(of, "restitutions", table.restitutions, "by_speed");
+        return table;
+    }
+    refuse_others(of, {"speed", "exponent"}, "by_speed");
+    PowerOfSpeed power;
+    put(of, "speed", power.speed, "by_speed");
+    put(of, "exponent", power.exponent, "by_speed");
+    return power;
+}
+
 // --- options ---
 
 using Setter = std::function<void(SceneOptions&, const py::handle&)>;
@@ -166,6 +193,7 @@ template <class T>
         {"record_events", setter(&SceneOptions::record_events)},
         {"sample_times", setter(&SceneOptions::sample_times)},
         {"max_events", setter(&SceneOptions::max_events)},
+        {"seed", setter(&SceneOptions::seed)},
     };
     return all;
 }
@@ -337,10 +365,22 @@ void bind_parts(py::class_<PyScene, std::shared_ptr<PyScene>>& scene)
 {
     scene
         .def("material",
-             [](PyScene& self, const std::string& name, double restitution, double friction) {
+             [](PyScene& self, const std::string& name, double restitution, double friction,
+                const py::object& by_speed) {
                  return self.scene
-                     .material({.name = name, .restitution = restitution, .friction = friction})
+                     .material({.name = name,
+                                .restitution = restitution,
+                                .friction = friction,
+                                .by_speed = law_from(by_speed)})
                      .index;
+             })
+        .def("pair",
+             [](PyScene& self, std::uint32_t first, std::uint32_t second, double restitution,
+                double friction, const py::object& by_speed) {
+                 self.scene.pair({.between = {MaterialId{first}, MaterialId{second}},
+                                  .restitution = restitution,
+                                  .friction = friction,
+                                  .by_speed = law_from(by_speed)});
              })
         .def("disc",
              [](PyScene& self, const std::string& name, const Vector2& at, const Vector2& velocity,
@@ -369,35 +409,38 @@ void bind_parts(py::class_<PyScene, std::shared_ptr<PyScene>>& scene)
              })
         .def("wall",
              [](PyScene& self, const std::string& name, const Vector2& point, const Vector2& normal,
-                std::uint32_t material, const py::object& motion) {
+                std::uint32_t material, const py::object& motion, double temperature) {
                  return self.scene
                      .wall({.name = name,
                             .point = point,
                             .normal = normal,
                             .material = {material},
-                            .motion = motion_from(motion)})
+                            .motion = motion_from(motion),
+                            .temperature = temperature})
                      .index;
              })
         .def("terrain",
              [](PyScene& self, const std::string& name, const std::vector<Vector2>& points,
-                bool closed, std::uint32_t material, const py::object& motion) {
+                bool closed, std::uint32_t material, const py::object& motion, double temperature) {
                  return self.scene
                      .terrain({.name = name,
                                .points = points,
                                .closed = closed,
                                .material = {material},
-                               .motion = motion_from(motion)})
+                               .motion = motion_from(motion),
+                               .temperature = temperature})
                      .index;
              })
         .def("arc",
              [](PyScene& self, const std::string& name, const Vector2& centre, double radius,
-                const std::array<Vector2, 2>& ends, std::uint32_t material) {
+                const std::array<Vector2, 2>& ends, std::uint32_t material, double temperature) {
                  return self.scene
                      .arc({.name = name,
                            .centre = centre,
                            .radius = radius,
                            .ends = ends,
-                           .material = {material}})
+                           .material = {material},
+                           .temperature = temperature})
                      .index;
              })
         .def("spring", [](PyScene& self, std::uint32_t first, std::uint32_t second, double rest,
