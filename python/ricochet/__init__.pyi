@@ -258,6 +258,10 @@ class SceneRun:
     trajectory_velocities: _Floats
     trajectory_asleep: NDArray[np.bool_]
     winding: NDArray[np.int32]
+    angles: _Floats
+    spins: _Floats
+    trajectory_angles: _Floats
+    trajectory_spins: _Floats
     trajectory_winding: NDArray[np.int32]
     energy: _Floats
     energy_at_end: float
@@ -280,6 +284,7 @@ class Scene:
              friction: float = 0.0, by_speed: Optional[Mapping[str, Any]] = None) -> None: ...
     def disc(self, at: ArrayLike, *, radius: float = 1.0, mass: float = 1.0,
              velocity: ArrayLike = (0.0, 0.0), drag: float = 0.0, material: Optional[str] = None,
+             inertia: float = 0.0, angle: float = 0.0, spin: float = 0.0,
              name: Optional[str] = None) -> int: ...
     def point(self, at: ArrayLike, *, mass: float = 1.0, velocity: ArrayLike = (0.0, 0.0),
               drag: float = 0.0, material: Optional[str] = None,

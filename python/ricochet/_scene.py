@@ -77,6 +77,8 @@ class SceneRun:
         (times, bodies).
     winding, trajectory_winding : ndarray of int, shapes (bodies, 2) and (times, bodies, 2)
         Periods that each body has gone along x and y, in a scene with a ``period``; else 0.
+    angles, spins, trajectory_angles, trajectory_spins : ndarray, (bodies,) and (times, bodies)
+        [rad] and [rad/s] of discs with an ``inertia``; else 0.
     energy : ndarray, shape (times,)
         At ``times``, kinetic and of gravity and springs; ``energy_at_end`` at ``t``.
     events : ndarray, shape (events,)
@@ -103,9 +105,14 @@ class SceneRun:
         for name, column in columns.items():
             self.events[name] = column
         period = np.array(scene._scene.period)
+        self.angles, self.spins = (rows[0] for rows in found["turns"])
+        self.trajectory_angles, self.trajectory_spins = found["sample_turns"]
+        inertias = scene._scene.inertias
         self.energy = scene.energy(self.trajectory + self.trajectory_winding * period,
                                    self.trajectory_velocities)
-        self.energy_at_end = float(scene.energy(last[0] + last[3] * period, last[1])[0])
+        self.energy += 0.5 * self.trajectory_spins**2 @ inertias
+        self.energy_at_end = float(scene.energy(last[0] + last[3] * period, last[1])[0]
+                                   + 0.5 * self.spins**2 @ inertias)
         self.body_names, self.surface_names = scene.body_names, scene.surface_names
         self.statistics = SimpleNamespace(**found["statistics"])
 
@@ -117,8 +124,8 @@ class SceneRun:
 class Scene:
     """Discs and points in a plane, with walls, terrain and springs; each body has its own clock.
 
-    The plane is vertical with gravity, horizontal without. Discs do not spin: friction acts at their
-    centres. Lengths are in m, times in s, masses in kg.
+    The plane is vertical with gravity, horizontal without. Discs turn if they have an inertia; at
+    others friction acts at the centre. Lengths are in m, times in s, masses in kg.
 
     Parameters
     ----------
@@ -184,14 +191,17 @@ class Scene:
         return self._materials[name]
 
     def disc(self, at, *, radius=1.0, mass=1.0, velocity=(0.0, 0.0), drag=0.0, material=None,
-             name=None):
+             inertia=0.0, angle=0.0, spin=0.0, name=None):
         """Adds a disc with its centre ``at`` (x, y), and returns its number among the bodies.
 
-        ``drag`` [kg/s] is the d of a force -d velocity.
+        ``drag`` [kg/s] is the d of a force -d velocity. With an ``inertia`` [kg m^2], mass radius^2 / 2
+        for a solid disc, it turns, from this ``angle`` [rad] with this ``spin`` [rad/s].
         """
         return self._scene.disc(_text(name), _pair(at, "at"), _pair(velocity, "velocity"),
                                 number_from(radius, "radius"), number_from(mass, "mass"),
-                                number_from(drag, "drag"), self._material(material))
+                                number_from(drag, "drag"), self._material(material),
+                                number_from(inertia, "inertia"), number_from(angle, "angle"),
+                                number_from(spin, "spin"))
 
     def point(self, at, *, mass=1.0, velocity=(0.0, 0.0), drag=0.0, material=None, name=None):
         """Adds a body without extension, and returns its number; two points never meet."""

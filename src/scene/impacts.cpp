@@ -106,6 +106,43 @@ void Impacts::set_masses(Cluster& cluster) const
     }
 }
 
+/// Effective masses across, where edges move with the spin: an impulse J across turns the disc a by
+/// -r J / I, and moves its edge by r^2 J / I more than its centre.
+void Impacts::set_masses_of_edges(Cluster& cluster)
+{
+    const auto edge = [&](std::uint32_t slot) {
+        return cluster.radii[slot] * cluster.radii[slot] * cluster.inverse_inertias[slot];
+    };
+    for (Contact& contact : cluster.contacts) {
+        const double more = edge(contact.slot_a) + (contact.surface ? 0 : edge(contact.slot_b));
+        if (more == 0) continue;
+        const double inverse = contact.tangential_mass > 0 ? 1 / contact.tangential_mass : 0;
+        contact.tangential_mass = 1 / (inverse + more);
+    }
+}
+
+/// [m/s] Relative velocity across of the two edges that touch, or of two centres that do not turn.
+double Impacts::slip(const Cluster& cluster, const Contact& contact)
+{
+    const double centres = dot(relative_velocity(cluster.after, contact), turned(contact.normal));
+    if (cluster.spins.empty()) return centres;
+    const auto edge = [&](std::uint32_t slot) {
+        return cluster.inverse_inertias[slot] > 0 ? cluster.radii[slot] * cluster.spins[slot] : 0;
+    };
+    return centres - (edge(contact.slot_a) + (contact.surface ? 0 : edge(contact.slot_b)));
+}
+
+/// Turns the discs of a contact by an impulse across.
+void Impacts::turn(Cluster& cluster, const Contact& contact, double tangential)
+{
+    if (cluster.spins.empty()) return;
+    const auto apply = [&](std::uint32_t slot) {
+        cluster.spins[slot] -= cluster.radii[slot] * tangential * cluster.inverse_inertias[slot];
+    };
+    apply(contact.slot_a);
+    if (!contact.surface) apply(contact.slot_b);
+}
+
 /// Resolves one contact alone, in closed form. The normal has the length 1 up to rounding, always
 /// on the same side for the same normal: uncorrected, an elastic impact would change the energy by
 /// |n|^2 - 1 of the work, and many of them would make it drift.
@@ -117,10 +154,11 @@ void Impacts::strike(Cluster& cluster, Contact& contact) const
     contact.tangential = 0;
     if (contact.friction > 0) {
         const Vector2 tangent = turned(contact.normal);
-        const double slip = dot(relative_velocity(cluster.after, contact), tangent);
+        const double slips = slip(cluster, contact);
         const double most = contact.friction * contact.impulse;
-        contact.tangential = std::clamp(-slip * contact.tangential_mass, -most, most);
+        contact.tangential = std::clamp(-slips * contact.tangential_mass, -most, most);
         push(cluster, contact, contact.impulse * contact.normal + contact.tangential * tangent);
+        turn(cluster, contact, contact.tangential);
     } else {
         push(cluster, contact, contact.impulse * contact.normal);
     }
@@ -213,6 +251,7 @@ void Impacts::solve(Cluster& cluster) const
     }
     const double smallest = 0.5 * epsilon * fastest;
     const std::vector<Vector2> start = cluster.after;
+    const std::vector<double> spins = cluster.spins;
     const bool exact = cluster.couplings.empty() && struck_.size() <= most_exact;
     if (exact && !friction) {
         if (sweep(cluster, smallest, few_sweeps) && struck_.size() <= few) return;
@@ -225,6 +264,7 @@ void Impacts::solve(Cluster& cluster) const
     // Where a heavy body presses a light one on others, the number of sweeps grows with the ratio
     // of their masses: these begin with the normal impulses without friction.
     cluster.after = start;
+    cluster.spins = spins;
     for (const std::uint32_t k : struck_) cluster.contacts[k].tangential = 0;
     if (!solve_exactly(cluster)) {
         cluster.after = start;
@@ -245,6 +285,10 @@ double Impacts::kinetic_energy(const Cluster& cluster) const
         }
         twice +=
             dot(cluster.after[i], cluster.after[i]) / world_.bodies[cluster.bodies[i]].inverse_mass;
+    }
+    for (std::size_t i = 0; i < cluster.spins.size(); ++i) {
+        if (cluster.inverse_inertias[i] == 0) continue;
+        twice += cluster.spins[i] * cluster.spins[i] / cluster.inverse_inertias[i];
     }
     return 0.5 * twice;
 }
@@ -285,6 +329,7 @@ double Impacts::size_of_works(const Cluster& cluster) const
 void Impacts::solve_without_gain(Cluster& cluster)
 {
     const std::vector<Vector2> start = cluster.after;
+    const std::vector<double> spins = cluster.spins;
     impulses_before_ = cluster.impulses;
     const double most = kinetic_energy(cluster) * (1 + 1e-12);
     solve(cluster);
@@ -293,6 +338,7 @@ void Impacts::solve_without_gain(Cluster& cluster)
         const double gained = kinetic_energy(cluster) - work_of_surfaces(cluster) - most;
         if (gained <= 1e-12 * size_of_works(cluster)) break;
         cluster.after = start;
+        cluster.spins = spins;
         cluster.impulses = impulses_before_;
         for (const std::uint32_t k : struck_) {
             Contact& contact = cluster.contacts[k];
@@ -325,11 +371,12 @@ bool Impacts::sweep(Cluster& cluster, double smallest, int most) const
             Vector2 impulse = change * contact.normal;
             if (contact.friction > 0) {
                 const Vector2 tangent = turned(contact.normal);
-                const double slip = dot(relative_velocity(cluster.after, contact), tangent);
+                const double slips = slip(cluster, contact);
                 const double most = contact.friction * contact.impulse;
                 const double held =
-                    std::clamp(contact.tangential - slip * contact.tangential_mass, -most, most);
+                    std::clamp(contact.tangential - slips * contact.tangential_mass, -most, most);
                 impulse = impulse + (held - contact.tangential) * tangent;
+                turn(cluster, contact, held - contact.tangential);
                 contact.tangential = held;
             }
             push(cluster, contact, impulse);
@@ -437,6 +484,7 @@ bool Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneE
         contact.mass = contact.tangential_mass = 1 / inverse;
     }
     if (!cluster.couplings.empty()) set_masses(cluster);
+    if (!cluster.spins.empty()) set_masses_of_edges(cluster);
     t_ = t;
     const std::size_t each = cluster.lasting ? lasting_patience : patience;
     const std::size_t most = each * cluster.contacts.size();

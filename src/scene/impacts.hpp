@@ -60,6 +60,9 @@ struct Cluster {
     std::vector<Coupling> couplings;       ///< where there are systems
     std::vector<Vector2> impulses;         ///< the same, on each body
     double fastest = 0;                    ///< [m/s] the largest speed before
+    std::vector<double> spins;             ///< [rad/s] of bodies, where a disc turns
+    std::vector<double> inverse_inertias;  ///< [1/(kg m^2)] the same
+    std::vector<double> radii;             ///< [m] the same
     bool lasting = false;                  ///< whether one of the bodies is in lasting contact
 
     void clear()
@@ -71,6 +74,9 @@ struct Cluster {
         sides.clear();
         couplings.clear();
         impulses.clear();
+        spins.clear();
+        inverse_inertias.clear();
+        radii.clear();
     }
 };
 
@@ -92,6 +98,9 @@ private:
     void push(Cluster& cluster, const Contact& contact, const Vector2& impulse) const;
     void push_coupled(Cluster& cluster, const Contact& contact, const Vector2& impulse) const;
     void set_masses(Cluster& cluster) const;
+    static void set_masses_of_edges(Cluster& cluster);
+    [[nodiscard]] static double slip(const Cluster& cluster, const Contact& contact);
+    static void turn(Cluster& cluster, const Contact& contact, double tangential);
     void strike(Cluster& cluster, Contact& contact) const;
     void strike_thermal(Cluster& cluster, Contact& contact) const;
     void apply_laws(Cluster& cluster);

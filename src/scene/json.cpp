@@ -378,8 +378,8 @@ private:
 
     void body(const Part& part, Scene& scene) const
     {
-        part.only(
-            {"name", "disc", "point", "at", "velocity", "drag", "material", "grid", "spacing"});
+        part.only({"name", "disc", "point", "at", "velocity", "angle", "spin", "drag", "material",
+                   "grid", "spacing"});
         if (part.has("disc") == part.has("point")) {
             part.fail(part.has("disc") ? R"(expected "disc" or "point" in a body, found both)"
                                        : R"(expected "disc" or "point" in a body, found neither)");
@@ -394,14 +394,31 @@ private:
         if (point) {
             shape.only({"mass"});
         } else {
-            shape.only({"radius", "mass"});
+            shape.only({"radius", "mass", "inertia"});
             disc.radius = Disc{}.radius;
             shape.number("radius", disc.radius);
+            part.number("angle", disc.angle);
+            part.number("spin", disc.spin);
+        }
+        for (const std::string_view key : {"angle", "spin"}) {
+            if (point && part.has(key)) part.fail_at(key, R"(a point has no angle and no spin)");
         }
         shape.number("mass", disc.mass);
+        if (shape.has("inertia")) disc.inertia = inertia_of(shape, disc);
         if (part.has("grid")) return grid(part, disc, point, scene);
         if (part.has("spacing")) part.fail_at("spacing", R"(expected "grid" with "spacing")");
         part.ask([&] { add(scene, disc, point); });
+    }
+
+    /// A number, or the inertia of a solid disc or of a ring.
+    [[nodiscard]] static double inertia_of(const Part& shape, const Disc& disc)
+    {
+        const json& value = shape.at("inertia");
+        const double ring = disc.mass * disc.radius * disc.radius;
+        if (value == "solid") return 0.5 * ring;
+        if (value == "ring") return ring;
+        if (!value.is_number()) shape.expected(R"(a number, "solid" or "ring")", "inertia", value);
+        return value.get<double>();
     }
 
     static void add(Scene& scene, const Disc& disc, bool point)

@@ -398,8 +398,8 @@ public:
 private:
     [[nodiscard]] bool is_out_of_reach() const
     {
-        const double way = reach_of(path_);
-        return std::fabs(distance_ - face_.length) - body_.radius > way;
+        const double farthest = reach_of(path_);
+        return std::fabs(distance_ - face_.length) - body_.radius > farthest;
     }
 
     /// The first contact from outside, or from inside: at this distance from the centre.

@@ -239,9 +239,13 @@ void Runner::sample_until(const Instant& t, bool inclusive, Samples& samples)
     for (; next_sample_ < times.size(); ++next_sample_) {
         const Instant at{times[next_sample_], 0};
         if (inclusive ? before(t, at) : !before(at, t)) return;
-        auto& row = samples[next_sample_];
+        auto& row = samples.states[next_sample_];
         for (const std::uint32_t i : members_) {
             row[i] = world_.state(i, at);
+        }
+        if (world_.turns.empty()) continue;
+        for (const std::uint32_t i : members_) {
+            samples.turns[next_sample_][i] = world_.turn(i, at);
         }
     }
 }

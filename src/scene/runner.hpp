@@ -33,7 +33,10 @@ struct GroupResult {
 };
 
 /// State of all bodies of a group at a sample time.
-using Samples = std::vector<std::vector<BodyState>>;
+struct Samples {
+    std::vector<std::vector<BodyState>>& states;
+    std::vector<std::vector<BodyTurn>>& turns;  ///< empty where no disc turns
+};
 
 /// A value for each body of a group, in memory for all labels from its first to its last. The value
 /// of a body that is alone is always in the same place in memory.
@@ -219,6 +222,7 @@ private:
     void settle(std::uint32_t i, std::uint32_t was);
     bool rests_on_face(std::uint32_t i);
     void halt(std::uint32_t i);
+    void stop_turning(std::uint32_t i, const std::vector<std::uint32_t>& faces);
     void leave_edge(std::uint32_t i);
     [[nodiscard]] std::vector<std::uint32_t> touching_faces(std::uint32_t i) const;
     void note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face, const Vector2& velocity);

@@ -112,6 +112,13 @@ void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::stri
     patience_.resize(world_.bodies.size());
     std::vector<std::uint32_t> members = contacts_.closure(bodies);
     for (const std::uint32_t i : members) {
+        if (!world_.turning(i)) continue;
+        return fail(Outcome::zeno, bodies,
+                    fmt::format("{} is in lasting contact, which of discs that turn is followed on "
+                                "surfaces alone",
+                                called(i)));
+    }
+    for (const std::uint32_t i : members) {
         if (!world_.bodies[i].mapped) continue;
         return fail(
             Outcome::zeno, bodies,

@@ -54,6 +54,13 @@ void Runner::gather(std::uint32_t i, const Pending& seed)
     }
     cluster_.after = cluster_.before;
     if (!world_.accelerations.empty()) add_couplings();
+    if (!world_.turns.empty()) {
+        for (const std::uint32_t body : cluster_.bodies) {
+            cluster_.spins.push_back(world_.spin(body, now_));
+            cluster_.inverse_inertias.push_back(world_.turns[body].inverse_inertia);
+            cluster_.radii.push_back(world_.bodies[body].radius);
+        }
+    }
     for (const std::uint32_t body : cluster_.bodies) slots_[body] = none;
 }
 
@@ -421,6 +428,7 @@ std::uint32_t Runner::begin_record(std::uint32_t i, const Vector2& velocity,
     body.t = now_;
     ++body.version;
     body.asleep = false;
+    if (world_.turning(i)) world_.set_spin(i, now_, world_.spin(i, now_));
     if (body.radius == 0) world_.remember(body, sides, flown);
     return std::exchange(body.held, none);
 }
@@ -433,6 +441,10 @@ void Runner::apply(bool struck)
     std::vector<std::uint32_t>& islands = slots_of_islands_;
     islands.clear();
     groups_struck_.clear();
+    for (std::size_t k = 0; k < cluster_.spins.size(); ++k) {
+        const std::uint32_t i = cluster_.bodies[k];
+        if (cluster_.spins[k] != world_.spin(i, now_)) world_.set_spin(i, now_, cluster_.spins[k]);
+    }
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
         if (cluster_.after[k] == cluster_.before[k]) continue;
         const std::uint32_t i = cluster_.bodies[k];

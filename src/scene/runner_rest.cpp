@@ -88,6 +88,7 @@ void Runner::settle(std::uint32_t i, std::uint32_t was)
         body.a = world_.gravity;
         body.held = none;
         body.asleep = false;
+        if (world_.turning(i)) world_.set_spin(i, body.t, world_.spin(i, body.t));
         return;
     }
     if (chosen == none) {
@@ -95,8 +96,19 @@ void Runner::settle(std::uint32_t i, std::uint32_t was)
         body.v = body.a = {};
         body.asleep = true;
         body.held = chosen = holding[0];
+        if (world_.turning(i)) stop_turning(i, holding);
     }
     if (chosen != was) note(SceneEvent::Kind::held, i, chosen, velocity);
+}
+
+/// In a corner friction stops a disc from turning.
+void Runner::stop_turning(std::uint32_t i, const std::vector<std::uint32_t>& faces)
+{
+    const Body& body = world_.bodies[i];
+    const bool rubs = std::ranges::any_of(faces, [&](std::uint32_t f) {
+        return world_.friction(body.material, world_.faces[f].material) > 0;
+    });
+    world_.set_spin(i, body.t, rubs ? 0 : world_.spin(i, body.t));
 }
 
 /// Whether surfaces alone hold, from now on, a body that presses on one of them.
@@ -133,8 +145,16 @@ void Runner::consider_own(std::uint32_t i)
         pending.kind = kind;
         pending.other = body.held;
     };
+    if (world_.turning(i) && world_.friction(body.material, face.material) > 0) {
+        const double slip = world_.slip_on(i, body.held);
+        const double rate = dot(body.a, turned(world_.push_of(body, body.held))) -
+                            body.radius * world_.turns[i].rate;
+        const double least =
+            8 * epsilon * (norm(body.v) + body.radius * std::fabs(world_.turns[i].spin));
+        if (std::fabs(slip) > least && slip * rate < 0) add(-slip / rate, Pending::Kind::stop);
+    }
     const double slowing = dot(body.v, body.a);
-    if (slowing < 0 && world_.friction(body.material, face.material) > 0) {
+    if (!world_.turning(i) && slowing < 0 && world_.friction(body.material, face.material) > 0) {
         add(-dot(body.v, body.v) / slowing, Pending::Kind::stop);
     }
     if (face.kind == Face::Kind::segment) {
@@ -151,7 +171,12 @@ void Runner::halt(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
     const Vector2 velocity = speed(body, seconds(body.t, now_));
-    const std::uint32_t face = begin_record(i, {}, sides_of(i, body.held));
+    const Vector2 left = world_.turning(i) ? velocity : Vector2{};  // a disc that turns rolls on
+    const std::uint32_t face = begin_record(i, left, sides_of(i, body.held));
+    if (world_.turning(i)) {
+        const Vector2 along = turned(world_.push_of(body, face));
+        world_.set_spin(i, now_, dot(velocity, along) / body.radius);
+    }
     world_.slide(i, face);
     if (body.asleep) {
         note(SceneEvent::Kind::stopped, i, face, velocity);

@@ -223,6 +223,12 @@ BodyId Scene::add(const Disc& body, std::string_view kind)
     require_moderate(body.velocity, prefix + "velocity");
     require_positive(who, prefix + "mass", body.mass);
     require_not_negative(who, prefix + "drag", body.drag);
+    require_not_negative(who, prefix + "inertia", body.inertia);
+    require_finite(who, prefix + "angle", body.angle);
+    require_finite(who, prefix + "spin", body.spin);
+    if (body.inertia == 0 && body.spin != 0) {
+        refuse(fmt::format("{}has a spin of {:g} rad/s and no inertia", prefix, body.spin));
+    }
     require_material(body.material, label);
     if (static_cast<double>(bodies_.size()) + 1 > std::numeric_limits<std::uint32_t>::max() / 2.0) {
         refuse("there are more bodies than handles");

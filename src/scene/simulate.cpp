@@ -59,6 +59,10 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
     const auto groups = groups_of(world);
     run.samples.resize(world.options.sample_times.size());
     for (auto& row : run.samples) row.resize(world.bodies.size());
+    if (!world.turns.empty()) {
+        run.sample_turns.assign(run.samples.size(), std::vector<BodyTurn>(world.bodies.size()));
+    }
+    Samples samples{run.samples, run.sample_turns};
     if (world.options.record_events) run.events.reserve(16);
     Runner runner(world, t_end);
     for (std::size_t number = 0; number < groups.size(); ++number) {
@@ -67,7 +71,7 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
         if (number > 0 && known + known / 8 > run.events.capacity()) {
             reserve_large(run.events, room_for(known, number, groups.size()));
         }
-        GroupResult result = runner.run(group, std::move(run.events), run.samples);
+        GroupResult result = runner.run(group, std::move(run.events), samples);
         run.events = std::move(result.events);
         world.statistics.groups += group.size() > 1;
         world.statistics.alone += group.size() == 1;
@@ -110,6 +114,7 @@ SceneRun run_until(const Scene& scene, const SceneOptions& options, const SceneT
     for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
         run.bodies[i] = world.state(i, end);
     }
+    for (std::uint32_t i = 0; i < world.turns.size(); ++i) run.turns.push_back(world.turn(i, end));
     for (std::uint32_t k = 0; k < world.islands->count(); ++k) {
         if (world.islands->is_system(k)) run.systems.push_back(world.islands->state(k, end));
     }
@@ -242,6 +247,7 @@ SceneRun detail::simulate(const Scene& scene, const SceneOptions& wanted, const 
     std::size_t rows = 0;
     for (const double t : options.sample_times) rows += t <= run.t;
     run.samples.resize(rows);
+    if (!run.turns.empty()) run.sample_turns.resize(rows);
     run.sample_times.assign(options.sample_times.begin(),
                             options.sample_times.begin() + static_cast<std::ptrdiff_t>(rows));
     return run;
@@ -266,6 +272,20 @@ double energy(const Scene& scene, const std::vector<BodyState>& bodies)
         const double length =
             norm(bodies[spring.between[0].index].at - bodies[spring.between[1].index].at);
         sum += 0.5 * spring.stiffness * (length - spring.rest) * (length - spring.rest);
+    }
+    return sum;
+}
+
+double energy(const Scene& scene, const std::vector<BodyState>& bodies,
+              const std::vector<BodyTurn>& turns)
+{
+    if (!turns.empty() && turns.size() != bodies.size()) {
+        Refuse{"energy"}(
+            fmt::format("{} angles are given for {} bodies", turns.size(), bodies.size()));
+    }
+    double sum = energy(scene, bodies);
+    for (std::size_t i = 0; i < turns.size(); ++i) {
+        sum += 0.5 * scene.bodies()[i].inertia * turns[i].spin * turns[i].spin;
     }
     return sum;
 }

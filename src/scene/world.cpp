@@ -72,6 +72,13 @@ World::World(const Scene& from, const SceneOptions& with)
         bodies.push_back(body);
         any_drag = any_drag || disc.drag > 0;
     }
+    const auto turns_itself = [](const Disc& disc) { return disc.inertia > 0; };
+    if (std::ranges::any_of(from.bodies(), turns_itself)) {
+        for (const Disc& disc : from.bodies()) {
+            const double inverse = disc.inertia > 0 ? 1 / disc.inertia : 0;
+            turns.push_back({start, disc.angle, disc.spin, 0, inverse});
+        }
+    }
     for (const bool walls : {true, false}) {
         std::uint32_t index = 0;
         for (const Scene::Surface& surface : from.surfaces()) {
@@ -298,6 +305,7 @@ void World::slide(std::uint32_t i, std::uint32_t face)
     const Vector2 along = turned(n);
     const double pull = dot(gravity, along);
     const double grip = friction(body.material, faces[face].material) * -dot(gravity, n);
+    if (turning(i) && grip > 0) return roll(i, face);
     const double speed = dot(body.v, along);
     const double rounding = 4 * epsilon * norm(gravity);
     body.held = face;
@@ -311,6 +319,40 @@ void World::slide(std::uint32_t i, std::uint32_t face)
     const double against = speed != 0 ? speed : pull;
     double rate = std::fabs(pull) <= rounding ? 0 : pull;
     if (grip > 0) rate -= std::copysign(grip, against);
+    body.a = rate * along;
+}
+
+double World::slip_on(std::uint32_t i, std::uint32_t face) const
+{
+    const Body& body = bodies[i];
+    return dot(body.v, turned(push_of(body, face))) - body.radius * spin(i, body.t);
+}
+
+/// Friction turns a disc while it slips: a + r^2 m f / I is the rate of the slip, with the friction
+/// f for each kg. Once it does not slip, it rolls with the friction that keeps it so, if it is no
+/// more than Coulomb's.
+void World::roll(std::uint32_t i, std::uint32_t face)
+{
+    Body& body = bodies[i];
+    const Vector2 n = push_of(body, face);
+    const Vector2 along = turned(n);
+    const double pull = dot(gravity, along);
+    const double grip = friction(body.material, faces[face].material) * -dot(gravity, n);
+    const double speed = dot(body.v, along);
+    const double mass = 1 / body.inverse_mass;
+    const double lever = body.radius * mass * turns[i].inverse_inertia;
+    const double ratio = 1 + body.radius * lever;  // of the rates of slip and velocity
+    const double rounding = 4 * epsilon * norm(gravity);
+    double slip = slip_on(i, face);
+    if (std::fabs(slip) <= 8 * epsilon * (std::fabs(speed) + std::fabs(speed - slip))) slip = 0;
+    body.held = face;
+    body.v = speed * along;
+    double force = -std::copysign(grip, slip != 0 ? slip : pull);
+    if (slip == 0 && std::fabs(pull) <= grip * ratio) force = -pull / ratio;
+    const double rate = std::fabs(pull) <= rounding && slip == 0 ? 0 : pull + force;
+    const double spin = slip == 0 ? speed / body.radius : this->spin(i, body.t);
+    set_spin(i, body.t, spin, rate == 0 ? 0 : -lever * force);
+    body.asleep = speed == 0 && rate == 0;
     body.a = rate * along;
 }
 
@@ -330,6 +372,7 @@ void World::put_to_sleep()
             if (body.asleep) break;
             body.held = none;
             body.a = gravity;
+            if (turning(i)) set_spin(i, body.t, spin(i, body.t));
         }
     }
 }

@@ -159,6 +159,42 @@ struct World {
     std::vector<Drift> drifts;  ///< of bodies in lasting contact, where there have been any
     SceneStatistics statistics;
 
+    /// The angle of a disc since its spin last changed.
+    struct Turn {
+        Instant t{};
+        double angle = 0;
+        double spin = 0;
+        double rate = 0;  ///< [rad/s^2] while friction turns it on a surface
+        double inverse_inertia = 0;
+    };
+    std::vector<Turn> turns;  ///< of bodies, where a disc has an inertia
+
+    [[nodiscard]] bool turning(std::uint32_t i) const noexcept
+    {
+        return !turns.empty() && turns[i].inverse_inertia > 0;
+    }
+    [[nodiscard]] double spin(std::uint32_t i, const Instant& t) const noexcept
+    {
+        return turns[i].spin + seconds(turns[i].t, t) * turns[i].rate;
+    }
+    [[nodiscard]] BodyTurn turn(std::uint32_t i, const Instant& t) const noexcept
+    {
+        const Turn& turn = turns[i];
+        const double s = seconds(turn.t, t);
+        return {turn.angle + s * (turn.spin + 0.5 * s * turn.rate), turn.spin + s * turn.rate};
+    }
+    /// Lets a disc turn with this spin from t on.
+    void set_spin(std::uint32_t i, const Instant& t, double spin, double rate = 0) noexcept
+    {
+        turns[i].angle = turn(i, t).angle;
+        turns[i].t = t;
+        turns[i].spin = spin;
+        turns[i].rate = rate;
+    }
+    /// [m/s] Speed at which the edge of a disc on a face slips along it, counterclockwise about the
+    /// side from which the face pushes.
+    [[nodiscard]] double slip_on(std::uint32_t i, std::uint32_t face) const;
+
     /// [m] Bound of the distance along a direction from the start of the current step of a body.
     [[nodiscard]] double reach_of_step(std::uint32_t i, const Vector2& direction) const noexcept
     {
@@ -263,6 +299,8 @@ struct World {
     [[nodiscard]] bool leads_off(const Face& face, const Vector2& p, const Vector2& heading) const;
     /// Makes a body on a face move along it from now on: pulled by gravity, slowed by friction.
     void slide(std::uint32_t i, std::uint32_t face);
+    /// The same for a disc that turns, where there is friction: it slips, or rolls.
+    void roll(std::uint32_t i, std::uint32_t face);
 
     /// [m] Distance beyond its ends up to which a segment holds a point; at a sharp corner the
     /// rounding of two sides moves a point by a multiple of itself.

@@ -1,7 +1,8 @@
 // Contents of a scene: discs and points, walls, terrain and arcs, springs, gravity and drag.
 //
 // A `Scene` holds and validates the description; `simulate` (scene/simulate.hpp) runs it. The plane
-// is vertical with gravity, horizontal without. Discs do not spin: friction acts at their centres.
+// is vertical with gravity, horizontal without. Discs turn if they have an inertia;
+// at others friction acts at the centre.
 #pragma once
 
 #include <array>
@@ -136,7 +137,7 @@ struct MaterialPair {
     SpeedLaw by_speed{};
 };
 
-/// A disc without spin.
+/// A disc. Without inertia it does not turn.
 struct Disc {
     std::string name{};  ///< if empty, the disc is called by its number
     Vector2 at{};        ///< [m] centre
@@ -145,6 +146,9 @@ struct Disc {
     double mass = 1;     ///< [kg], positive
     double drag = 0;     ///< [kg/s] force -drag velocity, not negative
     MaterialId material{};
+    double inertia = 0;  ///< [kg m^2] about the centre: mass radius^2 / 2 for a solid disc; 0: none
+    double angle = 0;    ///< [rad] counterclockwise
+    double spin = 0;     ///< [rad/s] its rate
 };
 
 /// A body without extension. Two points never meet.

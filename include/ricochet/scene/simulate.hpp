@@ -106,6 +106,12 @@ struct BodyState {
     std::array<std::int32_t, 2> winding{};
 };
 
+/// Angle and spin of a disc that turns.
+struct BodyTurn {
+    double angle = 0;  ///< [rad] counterclockwise, not reduced to one turn
+    double spin = 0;   ///< [rad/s]
+};
+
 /// Counts over a run.
 struct SceneStatistics {
     std::uint64_t impacts = 0;      ///< contacts with an impact
@@ -140,6 +146,9 @@ struct SceneRun {
     std::vector<double> sample_times;             ///< the sample times reached
     std::vector<std::vector<BodyState>> samples;  ///< one row per sample time
     SceneStatistics statistics;
+    /// Angles of all bodies at `t` and at the sample times; empty where no disc has an inertia.
+    std::vector<BodyTurn> turns;
+    std::vector<std::vector<BodyTurn>> sample_turns;
 };
 
 /// Simulates the scene from `t_start` to `t_end`.
@@ -154,6 +163,9 @@ struct SceneRun {
 /// Energy [J] of the bodies that are not part of systems: kinetic, and potential of gravity and
 /// springs, at places that count the periods gone. `bodies` holds one state for each body.
 [[nodiscard]] double energy(const Scene& scene, const std::vector<BodyState>& bodies);
+/// The same, and that of turning discs; `turns` has one entry for each body, or none.
+[[nodiscard]] double energy(const Scene& scene, const std::vector<BodyState>& bodies,
+                            const std::vector<BodyTurn>& turns);
 
 // Lasting contact of the bodies of a scene: stacks, sleeping bodies that lean on each other, chains
 // over an edge. Requires the contact solver; link the separate library `ricochet::scene_contact`.

@@ -49,20 +49,28 @@ bool is_periodic(const Scene& scene)
     return scene.settings().period != Vector2{};
 }
 
-Json state_of(const Scene& scene, std::uint32_t i, const BodyState& state)
+Json state_of(const Scene& scene, std::uint32_t i, const BodyState& state,
+              const std::vector<BodyTurn>& turns)
 {
     Json out{{"name", scene.name_of(BodyId{i})},
              {"at", state.at},
              {"velocity", state.velocity},
              {"asleep", state.asleep}};
     if (is_periodic(scene)) out["winding"] = state.winding;
+    if (!turns.empty()) {
+        out["angle"] = turns[i].angle;
+        out["spin"] = turns[i].spin;
+    }
     return out;
 }
 
-Json states_of(const Scene& scene, const std::vector<BodyState>& states)
+Json states_of(const Scene& scene, const std::vector<BodyState>& states,
+               const std::vector<BodyTurn>& turns)
 {
     Json all = Json::array();
-    for (std::uint32_t i = 0; i < states.size(); ++i) all.push_back(state_of(scene, i, states[i]));
+    for (std::uint32_t i = 0; i < states.size(); ++i) {
+        all.push_back(state_of(scene, i, states[i], turns));
+    }
     return all;
 }
 
@@ -117,7 +125,7 @@ std::string scene_text(const SceneFile& file, const SceneRun& run)
                    s.collapses);
     fmt::format_to(to, "steps       {} of springs and drag, {} of lasting contact\n", s.steps,
                    s.contact_steps);
-    fmt::format_to(to, "energy      {} J\n", energy(file.scene, run.bodies));
+    fmt::format_to(to, "energy      {} J\n", energy(file.scene, run.bodies, run.turns));
     return fmt::to_string(out);
 }
 
@@ -151,13 +159,14 @@ std::string scene_json(const SceneFile& file, const SceneRun& run, bool samples,
     if (run.outcome == Outcome::cancelled) out["incomplete"] = Interrupts::cause();
     out["involved"] = Json::array();
     for (const std::uint32_t i : run.involved) out["involved"].push_back(scene.name_of(BodyId{i}));
-    out["energy"] = energy(scene, run.bodies);
-    out["bodies"] = states_of(scene, run.bodies);
+    out["energy"] = energy(scene, run.bodies, run.turns);
+    out["bodies"] = states_of(scene, run.bodies, run.turns);
     if (samples) {
         out["samples"] = Json::array();
         for (std::size_t k = 0; k < run.samples.size(); ++k) {
+            const auto& turns = run.turns.empty() ? run.turns : run.sample_turns[k];
             out["samples"].push_back(
-                {{"t", run.sample_times[k]}, {"bodies", states_of(scene, run.samples[k])}});
+                {{"t", run.sample_times[k]}, {"bodies", states_of(scene, run.samples[k], turns)}});
         }
     }
     const SceneStatistics& s = run.statistics;
@@ -181,7 +190,8 @@ std::string scene_csv(const SceneFile& file, const SceneRun& run)
     fmt::memory_buffer out;
     const auto to = std::back_inserter(out);
     const bool periodic = is_periodic(file.scene);
-    fmt::format_to(to, "t,body,x,y,vx,vy,asleep{}\n", periodic ? ",winding_x,winding_y" : "");
+    fmt::format_to(to, "t,body,x,y,vx,vy,asleep{}{}\n", periodic ? ",winding_x,winding_y" : "",
+                   run.turns.empty() ? "" : ",angle,spin");
     for (std::size_t k = 0; k < run.samples.size(); ++k) {
         for (std::uint32_t i = 0; i < run.samples[k].size(); ++i) {
             const BodyState& b = run.samples[k][i];
@@ -189,6 +199,10 @@ std::string scene_csv(const SceneFile& file, const SceneRun& run)
                            csv_cell(file.scene.name_of(BodyId{i})), b.at[0], b.at[1], b.velocity[0],
                            b.velocity[1], static_cast<int>(b.asleep));
             if (periodic) fmt::format_to(to, ",{},{}", b.winding[0], b.winding[1]);
+            if (!run.turns.empty()) {
+                const BodyTurn& turn = run.sample_turns[k][i];
+                fmt::format_to(to, ",{},{}", turn.angle, turn.spin);
+            }
             fmt::format_to(to, "\n");
         }
     }

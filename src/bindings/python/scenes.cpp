@@ -291,6 +291,25 @@ template <class Of>
     return py::make_tuple(at, velocity, asleep, winding);
 }
 
+/// Angles and spins of all bodies at some times; zeros where no disc turns.
+[[nodiscard]] py::tuple turns_of(const std::vector<std::vector<BodyTurn>>& rows, std::size_t times,
+                                 std::size_t bodies)
+{
+    const auto count = static_cast<py::ssize_t>(bodies);
+    py::array angle = new_array<double>({static_cast<py::ssize_t>(times), count});
+    py::array spin = new_array<double>({static_cast<py::ssize_t>(times), count});
+    auto* a = static_cast<double*>(angle.mutable_data());
+    auto* s = static_cast<double*>(spin.mutable_data());
+    for (std::size_t k = 0; k < times; ++k) {
+        for (std::size_t i = 0; i < bodies; ++i) {
+            const BodyTurn turn = k < rows.size() && i < rows[k].size() ? rows[k][i] : BodyTurn{};
+            *a++ = turn.angle;
+            *s++ = turn.spin;
+        }
+    }
+    return py::make_tuple(angle, spin);
+}
+
 [[nodiscard]] py::dict counts_of(const SceneStatistics& s)
 {
     using namespace py::literals;
@@ -319,8 +338,10 @@ template <class Of>
     return py::dict(
         "outcome"_a = std::string(name(run.outcome)), "message"_a = run.message,
         "involved"_a = array_of(run.involved), "t"_a = run.t, "last"_a = states_of(last, bodies),
-        "samples"_a = states_of(run.samples, bodies), "times"_a = array_of(run.sample_times),
-        "events"_a = columns_of(run.events), "statistics"_a = counts_of(run.statistics));
+        "samples"_a = states_of(run.samples, bodies), "turns"_a = turns_of({run.turns}, 1, bodies),
+        "sample_turns"_a = turns_of(run.sample_turns, run.samples.size(), bodies),
+        "times"_a = array_of(run.sample_times), "events"_a = columns_of(run.events),
+        "statistics"_a = counts_of(run.statistics));
 }
 
 using Rows = py::array_t<double, py::array::c_style | py::array::forcecast>;
@@ -384,7 +405,8 @@ void bind_parts(py::class_<PyScene, std::shared_ptr<PyScene>>& scene)
              })
         .def("disc",
              [](PyScene& self, const std::string& name, const Vector2& at, const Vector2& velocity,
-                double radius, double mass, double drag, std::uint32_t material) {
+                double radius, double mass, double drag, std::uint32_t material, double inertia,
+                double angle, double spin) {
                  return self.scene
                      .disc({.name = name,
                             .at = at,
@@ -392,7 +414,10 @@ void bind_parts(py::class_<PyScene, std::shared_ptr<PyScene>>& scene)
                             .radius = radius,
                             .mass = mass,
                             .drag = drag,
-                            .material = {material}})
+                            .material = {material},
+                            .inertia = inertia,
+                            .angle = angle,
+                            .spin = spin})
                      .index;
              })
         .def("point",
@@ -501,6 +526,14 @@ PYBIND11_MODULE(_scenes, module)
                                })
         .def_property_readonly("period",
                                [](const PyScene& self) { return self.scene.settings().period; })
+        .def_property_readonly("inertias",
+                               [](const PyScene& self) {
+                                   std::vector<double> inertias;
+                                   for (const Disc& body : self.scene.bodies()) {
+                                       inertias.push_back(body.inertia);
+                                   }
+                                   return array_of(inertias);
+                               })
         .def_property_readonly("radii",
                                [](const PyScene& self) {
                                    std::vector<double> radii;
