@@ -301,6 +301,31 @@ class Scene:
         """
         return SceneRun(self, self._scene.simulate(self._options(t_end, options)))
 
+    def measure(self, t_start, t_end, *, blocks=10, area=None, lengths=None, **options):
+        """Runs a gas without gravity, and measures it from ``t_start`` to ``t_end`` [s].
+
+        Returns a namespace of pairs, the mean and its standard error over ``blocks`` equal parts of
+        that time: ``collision_rate`` and ``wall_rate`` [1/s], ``temperature`` (kT) [J],
+        ``virial_pressure`` [N/m], ``mean_free_path`` [m], and ``surface_pressure`` [N/m], one for each
+        surface, NaN unless ``lengths`` has its name or number with the length [m] that is struck.
+        ``area`` [m^2] of the gas is by default that of the ``period``. Options as of `simulate`; no
+        event is kept.
+        """
+        names = self.surface_names
+        known = [float("nan")] * len(names)
+        for surface, length in (lengths or {}).items():
+            number = names.index(surface) if surface in names else surface
+            if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < len(names):
+                raise ValueError(f"lengths: found {surface!r}, expected the name or number of a surface, "
+                                 f"some of {names}")
+            known[number] = number_from(length, "lengths")
+        if isinstance(blocks, bool) or not isinstance(blocks, int) or blocks < 2:
+            raise ValueError(f"blocks: found {blocks!r}, expected a whole number from 2 on")
+        found = self._scene.measure(number_from(t_start, "t_start"), number_from(t_end, "t_end"), blocks,
+                                    0.0 if area is None else number_from(area, "area"), known,
+                                    self._options(None, options))
+        return SimpleNamespace(**found)
+
     def explain(self, t_end=None, **options):
         """Says how the scene would be run, as a text; nothing is simulated."""
         return self._scene.explain(self._options(t_end, options))

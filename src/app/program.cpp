@@ -42,7 +42,8 @@ void check_value(std::string_view of, std::string_view value)
 }
 
 /// Checks all values of a command before they are used: every option that takes a value has exactly
-/// one (except --set and --vary, which may be repeated), and none is empty or the next option.
+/// one (except --set, --vary and --grid, which may be repeated), and none is empty or the next
+/// option.
 void check_values(const CLI::App& command, const std::vector<std::string>& arguments)
 {
     std::set<std::string> given;
@@ -56,7 +57,8 @@ void check_values(const CLI::App& command, const std::vector<std::string>& argum
             check_value("an argument", argument);
             continue;
         }
-        if (name != "--set" && name != "--vary" && !given.insert(name).second) {
+        const bool repeats = name == "--set" || name == "--vary" || name == "--grid";
+        if (!repeats && !given.insert(name).second) {
             throw BadInput(fmt::format("{} is given twice", name));
         }
         if (option->get_items_expected_min() == 0) {

@@ -111,7 +111,8 @@ void Impacts::set_masses(Cluster& cluster) const
 void Impacts::set_masses_of_edges(Cluster& cluster)
 {
     const auto edge = [&](std::uint32_t slot) {
-        return cluster.radii[slot] * cluster.radii[slot] * cluster.inverse_inertias[slot];
+        const TurningBody& body = cluster.turning[slot];
+        return body.radius * body.radius * body.inverse_inertia;
     };
     for (Contact& contact : cluster.contacts) {
         const double more = edge(contact.slot_a) + (contact.surface ? 0 : edge(contact.slot_b));
@@ -125,9 +126,10 @@ void Impacts::set_masses_of_edges(Cluster& cluster)
 double Impacts::slip(const Cluster& cluster, const Contact& contact)
 {
     const double centres = dot(relative_velocity(cluster.after, contact), turned(contact.normal));
-    if (cluster.spins.empty()) return centres;
+    if (cluster.turning.empty()) return centres;
     const auto edge = [&](std::uint32_t slot) {
-        return cluster.inverse_inertias[slot] > 0 ? cluster.radii[slot] * cluster.spins[slot] : 0;
+        const TurningBody& body = cluster.turning[slot];
+        return body.inverse_inertia > 0 ? body.radius * body.spin : 0;
     };
     return centres - (edge(contact.slot_a) + (contact.surface ? 0 : edge(contact.slot_b)));
 }
@@ -135,9 +137,10 @@ double Impacts::slip(const Cluster& cluster, const Contact& contact)
 /// Turns the discs of a contact by an impulse across.
 void Impacts::turn(Cluster& cluster, const Contact& contact, double tangential)
 {
-    if (cluster.spins.empty()) return;
+    if (cluster.turning.empty()) return;
     const auto apply = [&](std::uint32_t slot) {
-        cluster.spins[slot] -= cluster.radii[slot] * tangential * cluster.inverse_inertias[slot];
+        TurningBody& body = cluster.turning[slot];
+        body.spin -= body.radius * tangential * body.inverse_inertia;
     };
     apply(contact.slot_a);
     if (!contact.surface) apply(contact.slot_b);
@@ -171,8 +174,9 @@ void Impacts::strike_thermal(Cluster& cluster, Contact& contact) const
     MixedRandom random(world_.options.seed);
     random.mix(t_);
     for (const double number : {contact.at[0], contact.at[1], v[0], v[1]}) random.mix(number);
+    const double temperature = world_.scene.surfaces()[world_.faces[contact.b].surface].temperature;
     const double inverse = world_.bodies[contact.a].inverse_mass;
-    const Vector2 leaves = leaving_velocity(random, contact.temperature * inverse);
+    const Vector2 leaves = leaving_velocity(random, temperature * inverse);
     const Vector2 tangent = turned(contact.normal);
     const Vector2 after =
         contact.surface_velocity + leaves[0] * contact.normal + leaves[1] * tangent;
@@ -181,20 +185,24 @@ void Impacts::strike_thermal(Cluster& cluster, Contact& contact) const
     v = after;
 }
 
-/// Where laws are not constant: restitutions at the present speeds of approach, and a thermal
-/// contact alone, before the others of its wave.
-void Impacts::apply_laws(Cluster& cluster)
+/// Where laws are not constant: finds restitutions at the present speeds of approach, and strikes a
+/// thermal contact alone, before the others of its wave. Returns whether there was one.
+bool Impacts::apply_laws(Cluster& cluster)
 {
     for (const std::uint32_t k : struck_) {
         Contact& contact = cluster.contacts[k];
-        if (contact.temperature > 0) {
+        if (contact.thermal) {
             struck_ = {k};
-            return;
+            strike_thermal(cluster, contact);
+            return true;
         }
         if (!contact.by_speed) continue;
-        contact.restitution = world_.restitution(contact.materials[0], contact.materials[1],
+        const std::uint32_t other =
+            contact.surface ? world_.faces[contact.b].material : world_.bodies[contact.b].material;
+        contact.restitution = world_.restitution(world_.bodies[contact.a].material, other,
                                                  approach(cluster, contact));
     }
+    return false;
 }
 
 /// Effect of an impulse at one contact on another one along its normal.
@@ -251,7 +259,7 @@ void Impacts::solve(Cluster& cluster) const
     }
     const double smallest = 0.5 * epsilon * fastest;
     const std::vector<Vector2> start = cluster.after;
-    const std::vector<double> spins = cluster.spins;
+    const std::vector<TurningBody> turning = cluster.turning;
     const bool exact = cluster.couplings.empty() && struck_.size() <= most_exact;
     if (exact && !friction) {
         if (sweep(cluster, smallest, few_sweeps) && struck_.size() <= few) return;
@@ -264,7 +272,7 @@ void Impacts::solve(Cluster& cluster) const
     // Where a heavy body presses a light one on others, the number of sweeps grows with the ratio
     // of their masses: these begin with the normal impulses without friction.
     cluster.after = start;
-    cluster.spins = spins;
+    cluster.turning = turning;
     for (const std::uint32_t k : struck_) cluster.contacts[k].tangential = 0;
     if (!solve_exactly(cluster)) {
         cluster.after = start;
@@ -286,9 +294,8 @@ double Impacts::kinetic_energy(const Cluster& cluster) const
         twice +=
             dot(cluster.after[i], cluster.after[i]) / world_.bodies[cluster.bodies[i]].inverse_mass;
     }
-    for (std::size_t i = 0; i < cluster.spins.size(); ++i) {
-        if (cluster.inverse_inertias[i] == 0) continue;
-        twice += cluster.spins[i] * cluster.spins[i] / cluster.inverse_inertias[i];
+    for (const TurningBody& body : cluster.turning) {
+        if (body.inverse_inertia > 0) twice += body.spin * body.spin / body.inverse_inertia;
     }
     return 0.5 * twice;
 }
@@ -329,7 +336,7 @@ double Impacts::size_of_works(const Cluster& cluster) const
 void Impacts::solve_without_gain(Cluster& cluster)
 {
     const std::vector<Vector2> start = cluster.after;
-    const std::vector<double> spins = cluster.spins;
+    const std::vector<TurningBody> turning = cluster.turning;
     impulses_before_ = cluster.impulses;
     const double most = kinetic_energy(cluster) * (1 + 1e-12);
     solve(cluster);
@@ -338,7 +345,7 @@ void Impacts::solve_without_gain(Cluster& cluster)
         const double gained = kinetic_energy(cluster) - work_of_surfaces(cluster) - most;
         if (gained <= 1e-12 * size_of_works(cluster)) break;
         cluster.after = start;
-        cluster.spins = spins;
+        cluster.turning = turning;
         cluster.impulses = impulses_before_;
         for (const std::uint32_t k : struck_) {
             Contact& contact = cluster.contacts[k];
@@ -416,13 +423,9 @@ bool Impacts::wave(Cluster& cluster)
         const bool fast = u >= fastest * (1 - tie - contact.blur) && u > rounding;
         if (together || fast) struck_.push_back(k);
     }
-    if (!world_.plain_laws) apply_laws(cluster);
     ++world_.statistics.waves;
     before_wave_ = cluster.after;
-    if (cluster.contacts[struck_[0]].temperature > 0) {
-        strike_thermal(cluster, cluster.contacts[struck_[0]]);
-        return true;
-    }
+    if (!world_.plain_laws && apply_laws(cluster)) return true;
     const auto rubs = [&] { return cluster.contacts[struck_[0]].friction > 0; };
     if (struck_.size() == 1 && (cluster.couplings.empty() || !rubs())) {
         strike(cluster, cluster.contacts[struck_[0]]);
@@ -484,7 +487,7 @@ bool Impacts::resolve(Cluster& cluster, double t, bool spend, std::vector<SceneE
         contact.mass = contact.tangential_mass = 1 / inverse;
     }
     if (!cluster.couplings.empty()) set_masses(cluster);
-    if (!cluster.spins.empty()) set_masses_of_edges(cluster);
+    if (!cluster.turning.empty()) set_masses_of_edges(cluster);
     t_ = t;
     const std::size_t each = cluster.lasting ? lasting_patience : patience;
     const std::size_t most = each * cluster.contacts.size();

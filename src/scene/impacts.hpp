@@ -24,11 +24,10 @@ struct Contact {
     double target = 0;  ///< [m/s] required separation
     double mass = 0;    ///< effective, along the normal and across
     double tangential_mass = 0;
-    bool by_speed = false;   ///< whether restitution depends on the speed of approach
-    double temperature = 0;  ///< [J] of a thermal surface
-    std::array<std::uint32_t, 2> materials{};  ///< where it does
-    bool moving = false;                       ///< whether its surface moves
-    Vector2 surface_velocity{};                ///< [m/s]
+    bool moving = false;         ///< whether its surface moves
+    bool by_speed = false;       ///< whether restitution depends on the speed of approach
+    bool thermal = false;        ///< whether its surface is
+    Vector2 surface_velocity{};  ///< [m/s]
 };
 
 /// Velocity of body a relative to the body or face that it touches; `v` are the cluster's
@@ -51,6 +50,13 @@ struct Coupling {
     }
 };
 
+/// The spin of a body of a cluster.
+struct TurningBody {
+    double spin = 0;             ///< [rad/s]
+    double inverse_inertia = 0;  ///< [1/(kg m^2)]
+    double radius = 0;           ///< [m]
+};
+
 struct Cluster {
     std::vector<std::uint32_t> bodies;
     std::vector<Vector2> before;  ///< velocities
@@ -60,9 +66,7 @@ struct Cluster {
     std::vector<Coupling> couplings;       ///< where there are systems
     std::vector<Vector2> impulses;         ///< the same, on each body
     double fastest = 0;                    ///< [m/s] the largest speed before
-    std::vector<double> spins;             ///< [rad/s] of bodies, where a disc turns
-    std::vector<double> inverse_inertias;  ///< [1/(kg m^2)] the same
-    std::vector<double> radii;             ///< [m] the same
+    std::vector<TurningBody> turning;      ///< of bodies, where a disc turns
     bool lasting = false;                  ///< whether one of the bodies is in lasting contact
 
     void clear()
@@ -74,9 +78,7 @@ struct Cluster {
         sides.clear();
         couplings.clear();
         impulses.clear();
-        spins.clear();
-        inverse_inertias.clear();
-        radii.clear();
+        turning.clear();
     }
 };
 
@@ -103,7 +105,7 @@ private:
     static void turn(Cluster& cluster, const Contact& contact, double tangential);
     void strike(Cluster& cluster, Contact& contact) const;
     void strike_thermal(Cluster& cluster, Contact& contact) const;
-    void apply_laws(Cluster& cluster);
+    [[nodiscard]] bool apply_laws(Cluster& cluster);
     void solve(Cluster& cluster) const;
     void solve_without_gain(Cluster& cluster);
     [[nodiscard]] double kinetic_energy(const Cluster& cluster) const;

@@ -230,8 +230,8 @@ static bool lies_on_arc(const Face& face, double radius, const Vector2& p, doubl
     return face.span.contains(p - face.at, slack / face.length);
 }
 
-static FaceGap arc_gap(const Face& face, const Body& body, const Vector2& p, bool outside,
-                       double flown)
+[[gnu::noinline]] static FaceGap arc_gap(const Face& face, const Body& body, const Vector2& p,
+                                         bool outside, double flown)
 {
     const Vector2 apart = p - face.at;
     const double distance = norm(apart);

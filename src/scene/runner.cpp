@@ -363,7 +363,13 @@ void Runner::consider_body(std::uint32_t i, std::uint32_t j)
     if (j == i) return;
     const std::uint32_t group = world_.bodies[i].contact;
     if (group != none && group == world_.bodies[j].contact) return;
-    consider(i, meeting(i, j), false, j);
+    consider(i, meet(world_, i, j), false, j);
+}
+
+/// The same where the cell repeats.
+void Runner::consider_image(std::uint32_t i, std::uint32_t j)
+{
+    if (j != i) consider(i, meet_image(world_, i, j, now_), false, j);
 }
 
 void Runner::consider_faces(std::uint32_t i)
@@ -396,8 +402,13 @@ void Runner::predict(std::uint32_t i)
             predict_leaving(i);
         }
         if (celled_) {
-            grid_.each_near(world_.bodies, i, pending.cell,
-                            [&](std::uint32_t j) { consider_body(i, j); });
+            if (world_.periodic) {
+                grid_.each_near(world_.bodies, i, pending.cell,
+                                [&](std::uint32_t j) { consider_image(i, j); });
+            } else {
+                grid_.each_near(world_.bodies, i, pending.cell,
+                                [&](std::uint32_t j) { consider_body(i, j); });
+            }
             predict_crossing(i);
         }
     }
@@ -547,8 +558,13 @@ void Runner::cross(std::uint32_t i)
     const bool was_away = is_away_from_walls(i);
     grid_.step(world_.bodies, i, pending.cell, x, y);
     if (was_away) consider_walls(i);
-    grid_.each_ahead(world_.bodies, i, pending.cell, x, y,
-                     [&](std::uint32_t j) { consider_body(i, j); });
+    if (world_.periodic) {
+        grid_.each_ahead(world_.bodies, i, pending.cell, x, y,
+                         [&](std::uint32_t j) { consider_image(i, j); });
+    } else {
+        grid_.each_ahead(world_.bodies, i, pending.cell, x, y,
+                         [&](std::uint32_t j) { consider_body(i, j); });
+    }
     predict_crossing(i);
     put_in_calendar(i);
 }

@@ -130,6 +130,7 @@ private:
     void consider_own(std::uint32_t i);
     void consider_border(std::uint32_t i);
     void cross_border(std::uint32_t i);
+    void consider_image(std::uint32_t i, std::uint32_t j);
     [[nodiscard]] Meeting meeting(std::uint32_t i, std::uint32_t j) const
     {
         return world_.periodic ? meet_image(world_, i, j, now_) : meet(world_, i, j);
@@ -222,6 +223,7 @@ private:
     void settle(std::uint32_t i, std::uint32_t was);
     bool rests_on_face(std::uint32_t i);
     void halt(std::uint32_t i);
+    [[nodiscard]] double slips_for(std::uint32_t i) const;
     void stop_turning(std::uint32_t i, const std::vector<std::uint32_t>& faces);
     void leave_edge(std::uint32_t i);
     [[nodiscard]] std::vector<std::uint32_t> touching_faces(std::uint32_t i) const;

@@ -10,8 +10,8 @@ namespace ricochet::detail {
 bool Runner::flies_above_one_wall(const Body& body) const
 {
     if (members_.size() != 1 || world_.faces.size() != 1 || world_.wall_count != 1) return false;
+    if (!world_.ordinary) return false;
     if (body.held != none || body.island != none || world_.options.elastic_within > 0) return false;
-    if (world_.periodic || !world_.plain_laws || !world_.turns.empty()) return false;
     const Face& wall = world_.faces[0];
     if (!(dot(world_.gravity, wall.normal) < 0)) return false;
     if (world_.friction(body.material, wall.material) == 0) return true;

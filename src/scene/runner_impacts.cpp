@@ -54,11 +54,10 @@ void Runner::gather(std::uint32_t i, const Pending& seed)
     }
     cluster_.after = cluster_.before;
     if (!world_.accelerations.empty()) add_couplings();
-    if (!world_.turns.empty()) {
+    if (world_.any_turning) {
         for (const std::uint32_t body : cluster_.bodies) {
-            cluster_.spins.push_back(world_.spin(body, now_));
-            cluster_.inverse_inertias.push_back(world_.turns[body].inverse_inertia);
-            cluster_.radii.push_back(world_.bodies[body].radius);
+            cluster_.turning.push_back({world_.spin(body, now_), world_.turns[body].inverse_inertia,
+                                        world_.bodies[body].radius});
         }
     }
     for (const std::uint32_t body : cluster_.bodies) slots_[body] = none;
@@ -113,7 +112,7 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
     const double flown = rounding_of_flight(body, seconds(body.t, now_));
     for (const std::uint32_t f : faces_of(i)) {
         const Face& face = world_.faces[f];
-        if (face.kind != Face::Kind::segment && face.kind != Face::Kind::arc) continue;
+        if (!has_two_sides(face.kind)) continue;
         const bool above = world_.arrives_above(body, f, p, v);
         if (f != sure) {
             const double gap = face_gap(face, body, p, above, flown).gap;
@@ -130,6 +129,15 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
     return sides;
 }
 
+/// [rad] Rounding of the normal at the end of a segment, or at an arc.
+[[gnu::noinline]] static double blur_of_normal(const Face& face, double radius, const Vector2& p)
+{
+    if (face.kind == Face::Kind::arc) {
+        return World::rounding(p, face.length) / norm(p - face.at);
+    }
+    return radius > 0 ? World::rounding(p, radius) / radius : 0;
+}
+
 /// Gathers contacts of a body of the cluster with faces; `sure` counts as touched at any gap.
 void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
 {
@@ -142,12 +150,8 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
         contact.normal = normal;
         contact.at = p - body.radius * normal;
-        const Face::Kind kind = world_.faces[f].kind;
-        if (kind == Face::Kind::vertex && body.radius > 0) {
-            contact.blur = World::rounding(p, body.radius) / body.radius;
-        } else if (kind == Face::Kind::arc) {
-            const double distance = norm(p - world_.faces[f].at);
-            contact.blur = World::rounding(p, world_.faces[f].length) / distance;
+        if (is_round(world_.faces[f].kind)) {
+            contact.blur = blur_of_normal(world_.faces[f], body.radius, p);
         }
         contact.restitution = world_.restitution(body.material, world_.faces[f].material);
         contact.friction = world_.friction(body.material, world_.faces[f].material);
@@ -160,8 +164,7 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
         if (face.kind == Face::Kind::wall && f != sure && dot(p - face.at, face.normal) > near) {
             return;
         }
-        const bool two_sided = face.kind == Face::Kind::segment || face.kind == Face::Kind::arc;
-        const bool above = two_sided && world_.arrives_above(body, f, p, v);
+        const bool above = has_two_sides(face.kind) && world_.arrives_above(body, f, p, v);
         const FaceGap at = face_gap(face, body, p, above);
         double tolerance = World::rounding(p, body.radius) + World::blur(face, body.radius) +
                            2 * resolution(now_) * std::fabs(dot(v, at.normal));
@@ -176,14 +179,14 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
     const double flown = rounding_of_flight(body, seconds(body.t, now_));
     for (const Side& side : cluster_.sides.back()) {
         const Face& face = world_.faces[side.face];
-        if (face.kind == Face::Kind::arc) {
-            touch(side.face, face_gap(face, body, p, side.above, flown).normal);
+        const bool arc = face.kind == Face::Kind::arc;
+        if (!arc && side.face != sure &&
+            world_.passes_end(body, side.face, side.above, p, v, flown)) {
             continue;
         }
-        if (side.face != sure && world_.passes_end(body, side.face, side.above, p, v, flown)) {
-            continue;
-        }
-        touch(side.face, side.above ? face.normal : -1.0 * face.normal);
+        touch(side.face, arc          ? face_gap(face, body, p, side.above, flown).normal
+                         : side.above ? face.normal
+                                      : -1.0 * face.normal);
     }
     if (body.radius > 0 && on_terrain_) {
         for (const std::uint32_t f : faces_of(i)) look(f);
@@ -222,9 +225,8 @@ double Runner::loose_motion(std::uint32_t face, double size) const
 void Runner::set_laws(Contact& contact, std::uint32_t a, std::uint32_t b) const
 {
     contact.by_speed = world_.depends_on_speed(a, b);
-    contact.materials = {a, b};
     if (!contact.surface) return;
-    contact.temperature = world_.scene.surfaces()[world_.faces[contact.b].surface].temperature;
+    contact.thermal = world_.scene.surfaces()[world_.faces[contact.b].surface].temperature > 0;
 }
 
 void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
@@ -233,12 +235,13 @@ void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
     const Body& a = world_.bodies[i];
     const Vector2 p = world_.position(i, now_);
     const double slack = 1e-9 * (a.radius + std::fabs(p[0]) + std::fabs(p[1]));
+    const bool periodic = world_.periodic;
     grid_.each_near(world_.bodies, i, pending_[i].cell, [&](std::uint32_t j) {
         if (j == i) return;
         const Body& b = world_.bodies[j];
         if (j != sure && !b.quartic) {
             Vector2 near = p - place(b, seconds(b.t, now_));
-            if (world_.periodic) near = near - world_.image_shift(near);
+            if (periodic) near = near - world_.image_shift(near);
             const double limit = a.radius + b.radius + slack;
             if (dot(near, near) > limit * limit) return;
         }
@@ -441,9 +444,10 @@ void Runner::apply(bool struck)
     std::vector<std::uint32_t>& islands = slots_of_islands_;
     islands.clear();
     groups_struck_.clear();
-    for (std::size_t k = 0; k < cluster_.spins.size(); ++k) {
+    for (std::size_t k = 0; k < cluster_.turning.size(); ++k) {
         const std::uint32_t i = cluster_.bodies[k];
-        if (cluster_.spins[k] != world_.spin(i, now_)) world_.set_spin(i, now_, cluster_.spins[k]);
+        const double spin = cluster_.turning[k].spin;
+        if (spin != world_.spin(i, now_)) world_.set_spin(i, now_, spin);
     }
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
         if (cluster_.after[k] == cluster_.before[k]) continue;

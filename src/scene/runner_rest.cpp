@@ -12,7 +12,7 @@ std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
     std::vector<std::uint32_t> faces;
     const auto look = [&](std::uint32_t f) {
         const Face& face = world_.faces[f];
-        if (face.kind == Face::Kind::vertex || face.kind == Face::Kind::arc) return;
+        if (is_round(face.kind)) return;
         const bool above = face.kind == Face::Kind::segment && world_.begins_above(body, f);
         const double gap = face_gap(face, body, body.p, above).gap;
         const double rounding =
@@ -130,6 +130,19 @@ bool Runner::rests_on_face(std::uint32_t i)
     return true;
 }
 
+/// [s] Time until a disc that turns does not slip any more on the face that holds it.
+double Runner::slips_for(std::uint32_t i) const
+{
+    const Body& body = world_.bodies[i];
+    const World::Turn& turn = world_.turns[i];
+    if (!(world_.friction(body.material, world_.faces[body.held].material) > 0)) return never;
+    const double slip = world_.slip_on(i, body.held);
+    const Vector2 along = turned(world_.push_of(body, body.held));
+    const double rate = dot(body.a, along) - body.radius * turn.rate;
+    const double least = 8 * epsilon * (norm(body.v) + body.radius * std::fabs(turn.spin));
+    return std::fabs(slip) > least && slip * rate < 0 ? -slip / rate : never;
+}
+
 /// Predicts the times when friction stops a sliding body, or when its face ends.
 void Runner::consider_own(std::uint32_t i)
 {
@@ -145,14 +158,7 @@ void Runner::consider_own(std::uint32_t i)
         pending.kind = kind;
         pending.other = body.held;
     };
-    if (world_.turning(i) && world_.friction(body.material, face.material) > 0) {
-        const double slip = world_.slip_on(i, body.held);
-        const double rate = dot(body.a, turned(world_.push_of(body, body.held))) -
-                            body.radius * world_.turns[i].rate;
-        const double least =
-            8 * epsilon * (norm(body.v) + body.radius * std::fabs(world_.turns[i].spin));
-        if (std::fabs(slip) > least && slip * rate < 0) add(-slip / rate, Pending::Kind::stop);
-    }
+    if (world_.turning(i)) add(slips_for(i), Pending::Kind::stop);
     const double slowing = dot(body.v, body.a);
     if (!world_.turning(i) && slowing < 0 && world_.friction(body.material, face.material) > 0) {
         add(-dot(body.v, body.v) / slowing, Pending::Kind::stop);

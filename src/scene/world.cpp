@@ -112,6 +112,9 @@ void World::find_laws()
     any_thermal = std::ranges::any_of(
         scene.surfaces(), [](const Scene::Surface& surface) { return surface.temperature > 0; });
     plain_laws = plain_laws && !any_thermal;
+    any_pairs = !scene.pairs().empty();
+    any_turning = !turns.empty();
+    ordinary = plain_laws && !periodic && !any_turning;
 }
 
 double World::restitution(std::uint32_t a, std::uint32_t b, double speed) const

@@ -67,7 +67,7 @@ static_assert(sizeof(Body) == 128);
 
 /// An obstacle that is no body: a wall, a segment, an arc, or an end of segments or arcs.
 struct Face {
-    enum class Kind : std::uint8_t { wall, segment, vertex, arc };
+    enum class Kind : std::uint8_t { wall, vertex, segment, arc };
     Kind kind = Kind::wall;
     Vector2 at{};       ///< point of a wall, start of a segment, vertex, centre of an arc
     Vector2 normal{};   ///< of length 1
@@ -80,6 +80,18 @@ struct Face {
     double blur = 0;
     ArcSpan span{};  ///< of an arc
 };
+
+/// Whether bodies meet a face from both sides.
+[[nodiscard]] constexpr bool has_two_sides(Face::Kind kind) noexcept
+{
+    return kind >= Face::Kind::segment;
+}
+
+/// Whether its normal follows from the place of a body.
+[[nodiscard]] constexpr bool is_round(Face::Kind kind) noexcept
+{
+    return kind == Face::Kind::vertex || kind == Face::Kind::arc;
+}
 
 /// The point of a face of terrain that is nearest to p.
 [[nodiscard]] Vector2 nearest_on(const Face& face, const Vector2& p) noexcept;
@@ -168,10 +180,11 @@ struct World {
         double inverse_inertia = 0;
     };
     std::vector<Turn> turns;  ///< of bodies, where a disc has an inertia
+    bool any_turning = false;
 
     [[nodiscard]] bool turning(std::uint32_t i) const noexcept
     {
-        return !turns.empty() && turns[i].inverse_inertia > 0;
+        return any_turning && turns[i].inverse_inertia > 0;
     }
     [[nodiscard]] double spin(std::uint32_t i, const Instant& t) const noexcept
     {
@@ -244,11 +257,13 @@ struct World {
     /// Whether restitution is constant and no wall is thermal.
     bool plain_laws = true;
     bool any_thermal = false;
+    bool any_pairs = false;  ///< of materials
+    bool ordinary = true;    ///< plain laws, and neither a period nor a disc that turns
 
     /// Of two materials; where it depends on the speed of approach, that of high speeds.
     [[nodiscard]] double restitution(std::uint32_t a, std::uint32_t b) const noexcept
     {
-        if (!scene.pairs().empty()) {
+        if (any_pairs) {
             if (const MaterialPair* pair = scene.pair_of(a, b)) return pair->restitution;
         }
         return std::min(scene.materials()[a].restitution, scene.materials()[b].restitution);
@@ -259,7 +274,7 @@ struct World {
     [[nodiscard]] bool depends_on_speed(std::uint32_t a, std::uint32_t b) const noexcept;
     [[nodiscard]] double friction(std::uint32_t a, std::uint32_t b) const noexcept
     {
-        if (!scene.pairs().empty()) {
+        if (any_pairs) {
             if (const MaterialPair* pair = scene.pair_of(a, b)) return pair->friction;
         }
         return std::min(scene.materials()[a].friction, scene.materials()[b].friction);

@@ -208,3 +208,65 @@ def test_bodies_that_overlap_are_named():
     scene.disc((0, 0), name="one")
     scene.disc((1, 0), name="two")
     refused(lambda: scene.simulate(1.0), ValueError, "one.*two|two.*one")
+
+
+def test_circles_repeat_across_the_border_of_a_period():
+    # A point along y = 0.125 strikes the pin at the corner of the next cell.
+    scene = Scene(period=(1, 1))
+    scene.arc((0, 0), radius=0.25, name="pin")
+    scene.point((0.5, 0.125), velocity=(1, 0))
+    run = scene.simulate(0.4)
+    assert run.events["t"] == pytest.approx([0.5 - np.sqrt(0.25**2 - 0.125**2)], rel=1e-14)
+    assert run.winding.tolist() == [[0, 0]]
+    free = Scene(period=(1, 2))
+    free.disc((0.25, 0.5), velocity=(1.5, -0.75), radius=0.1)
+    run = free.simulate(10, sample_times=[1])
+    assert run.winding.tolist() == [[15, -4]] and run.trajectory_winding.tolist() == [[[1, -1]]]
+    with pytest.raises(ValueError, match="expected a radius, or a start and an end"):
+        scene.arc((0, 0), radius=1, start=(1, 0), end=(0, 1))
+
+
+def test_discs_turn_where_they_have_an_inertia():
+    # Laid on a floor at 3 m/s, a solid disc rolls at 2 m/s after 0.5 s of slipping.
+    scene = Scene(gravity=(0, -10))
+    scene.material("felt", restitution=0, friction=0.2)
+    scene.wall((0, 0), (0, 1), material="felt")
+    scene.disc((0, 0.5), velocity=(3, 0), radius=0.5, mass=2, inertia=0.25, material="felt")
+    run = scene.simulate(1, sample_times=[0, 0.5])
+    assert run.velocities[0, 0] == pytest.approx(2) and run.spins[0] == pytest.approx(-4)
+    assert run.trajectory_spins[:, 0] == pytest.approx([0, -4])
+    assert run.energy == pytest.approx([9 + 10, 4 + 2 + 10])
+
+
+def test_pairs_speeds_and_temperatures_of_materials():
+    scene = Scene()
+    scene.material("a", restitution=0.5, by_speed={"speed": 2, "exponent": 0.5})
+    scene.material("b", restitution=0.9)
+    scene.pair("a", "b", restitution=0.25)
+    scene.wall((0, 0), (1, 0), material="b")
+    scene.wall((4, 0), (-1, 0), temperature=2.0)
+    scene.disc((2, 0), velocity=(-1, 0), radius=0.5, material="a")
+    run = scene.simulate(40, seed=5)
+    assert run.events["after"][0, 0, 0] == pytest.approx(0.25)
+    assert run.events["after"][1, 0, 1] != 0
+    again = scene.simulate(40, seed=5)
+    assert (run.events["after"] == again.events["after"]).all()
+    with pytest.raises(ValueError, match="by_speed: found 'sped'"):
+        scene.material("c", by_speed={"sped": 1})
+
+
+def test_a_gas_is_measured():
+    # Two points between walls 2 m apart and 3 m long, at 4 m/s: m v^2 / (2 * 3) each, on each wall, with
+    # the one impact more or less that a block may have.
+    scene = Scene()
+    scene.wall((0, 0), (1, 0), name="left")
+    scene.wall((2, 0), (-1, 0))
+    scene.point((1, 0), velocity=(4, 0), mass=0.5)
+    scene.point((1, 9), velocity=(-4, 0), mass=0.5)
+    found = scene.measure(0, 100, blocks=4, area=6, lengths={"left": 3})
+    assert found.outcome == "reached_end"
+    assert found.surface_pressure[0][0] == pytest.approx(2 * 0.5 * 16 / 6, abs=0.06)
+    assert np.isnan(found.surface_pressure[1][0])
+    assert found.temperature[0] == pytest.approx(8)
+    with pytest.raises(ValueError, match="lengths: found 'right'"):
+        scene.measure(0, 1, area=6, lengths={"right": 3})

@@ -390,7 +390,7 @@ TEST(Terrain, APointThatFallsIntoACornerBouncesForEver)
         scene.point({.at = {0, 2}});
         const SceneRun run = simulate(scene, {.t_end = 100});
         ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
-        const auto& [at, velocity, asleep] = run.bodies[0];
+        const auto& [at, velocity, asleep, winding] = run.bodies[0];
         EXPECT_GT(at[1], std::max(-at[0], slope * at[0]) - 1e-12);
         // The energy of one kilogram, to the rounding of some hundred impacts.
         const double energy =

@@ -24,6 +24,10 @@
 #include "ricochet/ensemble.hpp"
 #include "share.hpp"
 
+#ifdef RICOCHET_HAS_SCENE
+#include "scene_runs.hpp"
+#endif
+
 namespace ricochet::app {
 
 namespace {
@@ -32,23 +36,27 @@ namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
 /// The requested table.
-Table table_of(const SystemEntry& system, const EnsembleRequest& request)
+Table table_of(const ColumnSource& source, const EnsembleRequest& request)
 {
     if (request.table && request.count) {
         throw BadInput("--table and --count both give the rows; expected one or the other");
     }
     if (request.table) {
+        if (!request.grid.empty()) throw BadInput("--grid gives rows, and so does --table");
         if (!request.vary.empty()) throw BadInput("--vary is for random rows, and needs --count");
         if (request.seed) throw BadInput("--seed is for random rows, and needs --count");
-        return read_table(system, *request.table);
+        return read_table(source, *request.table);
     }
-    if (!request.count) {
-        throw BadInput("the rows are missing: expected --table FILE, or --count N with --vary");
+    if (!request.count && request.grid.empty()) {
+        throw BadInput(
+            "the rows are missing: expected --table FILE, --grid name=first:last:count, or "
+            "--count N with --vary");
     }
-    if (request.vary.empty()) {
+    if (request.vary.empty() && request.grid.empty()) {
         throw BadInput("--count needs at least one --vary name=lowest:highest");
     }
-    return random_table(system, request.vary, *request.count, request.seed.value_or(1));
+    return made_table(source, request.grid, request.vary, request.count.value_or(1),
+                      request.seed.value_or(1));
 }
 
 /// The directory of the results, created if it does not exist.
@@ -106,7 +114,7 @@ private:
 /// The execution of one process's share of the rows.
 class ShareRun {
 public:
-    ShareRun(const EnsembleRuns& runs, const Share& share, const fs::path& directory)
+    ShareRun(const RowRuns& runs, const Share& share, const fs::path& directory)
         : runs_(runs),
           all_(runs.table().rows, share.count),
           setup_(runs.setup(share.count)),
@@ -201,7 +209,7 @@ public:
     }
 
 private:
-    const EnsembleRuns& runs_;
+    const RowRuns& runs_;
     Blocks all_;
     Json setup_;
     std::vector<Field> fields_;
@@ -263,31 +271,40 @@ std::vector<std::string> result_files(const fs::path& directory)
     return {(directory / "results.npy").string(), (directory / "results.csv").string()};
 }
 
-EnsembleRuns runs_of(const EnsembleRequest& request)
+std::unique_ptr<RowRuns> runs_of(const EnsembleRequest& request)
 {
     if (request.system.empty()) throw BadInput("ensemble needs a SYSTEM, or --merge DIR");
+    const std::size_t events = request.events.value_or(0);
+    if (request.system.ends_with(".json")) {
+#ifdef RICOCHET_HAS_SCENE
+        const SceneText text(request.system, request.run);
+        return std::make_unique<SceneRuns>(text, table_of(text.columns(), request), events);
+#else
+        throw BadInput("this program was built without scenes; expected the name of a system");
+#endif
+    }
     const SystemEntry& system = find_system(request.system);
     if (system.run == nullptr) {
         throw BadInput(
             fmt::format("{} is run by ricochet{} simulate alone", system.name,
                         system.program.empty() ? "" : fmt::format("-{}", system.program)));
     }
-    return {system, request.run, table_of(system, request)};
+    return std::make_unique<EnsembleRuns>(system, request.run,
+                                          table_of(columns_of(system), request), events);
 }
 
 int run_share(const EnsembleRequest& request)
 {
-    const EnsembleRuns runs = runs_of(request);
-    const SystemEntry& system = runs.system();
+    const std::unique_ptr<RowRuns> runs = runs_of(request);
     const Share share = chosen_share(request.share);
     const fs::path directory = claim_directory(request, share);
 
     const Interrupts interrupts;
-    ShareRun work(runs, share, directory);
+    ShareRun work(*runs, share, directory);
     const auto start = Clock::now();
     work.run(request.threads.value_or(0));
     const std::chrono::duration<double> spent = Clock::now() - start;
-    Summary summary{.system = std::string(system.name),
+    Summary summary{.system = runs->name(),
                     .share = share,
                     .rows = work.rows(),
                     .rows_run = work.rows_run(),
@@ -393,11 +410,11 @@ int run_ensemble_dealt(const EnsembleRequest& request, const BlockDealer& dealer
             "blocks are dealt to processes of one thread; --share, --merge and --threads "
             "are for ricochet ensemble");
     }
-    const EnsembleRuns runs = runs_of(request);
+    const std::unique_ptr<RowRuns> runs = runs_of(request);
     const fs::path directory = claim_directory(request, dealer.place);
     const Interrupts interrupts;
     {
-        ShareRun work(runs, dealer.place, directory);
+        ShareRun work(*runs, dealer.place, directory);
         dealer.wait_for_all();  // now all files exist
         const Merged there = read_shares(directory);
         work.run_dealt(dealer.next, *there.blocks);

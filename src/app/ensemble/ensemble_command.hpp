@@ -22,8 +22,10 @@ struct EnsembleRequest {
     std::string system{};
     RunRequest run{};
     std::optional<std::filesystem::path> table{};
-    std::optional<std::size_t> count{};  ///< of random rows
-    std::vector<std::string> vary{};     ///< name=lowest:highest
+    std::optional<std::size_t> count{};   ///< of random rows
+    std::vector<std::string> vary{};      ///< name=lowest:highest, see `made_table`
+    std::vector<std::string> grid{};      ///< name=first:last:count
+    std::optional<std::size_t> events{};  ///< number of the first events whose times are results
     std::optional<std::uint64_t> seed{};
     std::optional<std::filesystem::path> out{};
     std::optional<std::string> share{};  ///< k/n

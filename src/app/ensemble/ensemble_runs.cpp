@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -18,8 +20,17 @@ static_assert(block_rows == ensemble_chunk);  // so a chunk of a share is a bloc
 
 namespace {
 
-constexpr std::size_t outcome_width = 24;  // characters; the longest is time_event_not_ahead
-constexpr std::string_view failed = "failed";
+/// @throws BadInput for an option that is set both for all rows and in each
+void check_options(const RunRequest& request, const Column& column)
+{
+    const std::array<bool, 7> given{
+        request.t_start.has_value(),  request.t_end.has_value(),
+        request.rtol.has_value(),     request.atol.has_value(),
+        request.step.has_value(),     request.event_tolerance.has_value(),
+        request.max_steps.has_value()};
+    if (column.index >= given.size() || !given[column.index]) return;
+    throw BadInput(fmt::format("--{} is given, and there is a column of it", column.name));
+}
 
 /// @throws BadInput for a parameter that is set both for all rows and in each, or on which a model
 ///         depends.
@@ -30,6 +41,7 @@ void check_columns(const SystemEntry& system, const RunRequest& request,
                          : settings.gate  ? &*settings.gate
                                           : nullptr;
     for (const Column& column : table.columns) {
+        if (column.is_option) check_options(request, column);
         if (!column.parameter) continue;
         const std::string name(system.parameters[column.index].name);
         for (const std::string& text : request.set) {
@@ -45,15 +57,6 @@ void check_columns(const SystemEntry& system, const RunRequest& request,
                             settings.model.string(), name, trained));
         }
     }
-}
-
-/// Names and units of columns or components.
-template <class Parts>
-Json names_and_units(const Parts& parts)
-{
-    Json out = Json::array();
-    for (const auto& part : parts) out.push_back({part.name, part.unit});
-    return out;
 }
 
 Json settings_json(const SystemEntry& system, const RunSettings& settings, bool mode_follows)
@@ -86,7 +89,7 @@ Json settings_json(const SystemEntry& system, const RunSettings& settings, bool 
     return out;
 }
 
-std::vector<Field> fields_of(const SystemEntry& system, const Table& table)
+std::vector<Field> fields_of(const SystemEntry& system, const Table& table, std::size_t events)
 {
     using enum FieldKind;
     std::vector<Field> out{{.name = "row", .unit = "", .kind = count}};
@@ -107,18 +110,31 @@ std::vector<Field> fields_of(const SystemEntry& system, const Table& table)
     for (const char* name : {"events", "steps", "rejected", "flow_calls", "guard_calls"}) {
         out.push_back({.name = name, .unit = "", .kind = count});
     }
+    add_event_fields(events, out);
     out.push_back({.name = "message", .unit = "", .kind = text});
     return out;
 }
 
 }  // namespace
 
-EnsembleRuns::EnsembleRuns(const SystemEntry& system, const RunRequest& request, Table table)
-    : system_(system), settings_(resolve(system, request)), table_(std::move(table))
+void add_event_fields(std::size_t events, std::vector<Field>& fields)
+{
+    for (std::size_t k = 1; k <= events; ++k) {
+        fields.push_back({.name = fmt::format("event_{}", k), .unit = "s"});
+    }
+}
+
+EnsembleRuns::EnsembleRuns(const SystemEntry& system, const RunRequest& request, Table table,
+                           std::size_t events)
+    : system_(system),
+      settings_(resolve(system, request)),
+      table_(std::move(table)),
+      events_(events)
 {
     check_columns(system, request, settings_, table_);
     validate(settings_.options, settings_.fixed_step);
-    settings_.options.record_events = false;
+    settings_.options.record_events = events > 0;
+    sets_options_ = std::ranges::any_of(table_.columns, &Column::is_option);
     mode_follows_ = !request.mode && system.start_mode != nullptr;
 }
 
@@ -140,7 +156,7 @@ Json EnsembleRuns::setup(std::size_t shares) const
             {"table", table_.identity},
             {"parameters", std::move(parameters)},
             {"settings", settings_json(system_, settings_, mode_follows_)},
-            {"fields", to_json(fields_of(system_, table_))}};
+            {"fields", to_json(fields_of(system_, table_, events_))}};
 }
 
 void EnsembleRuns::put_inputs(std::size_t row, RowWriter& out) const
@@ -154,12 +170,29 @@ void EnsembleRuns::put_failure(std::size_t row, std::string_view message, std::s
     constexpr double none = std::numeric_limits<double>::quiet_NaN();
     RowWriter writer(out);
     put_inputs(row, writer);
-    writer.text(failed);
+    writer.text(failed_row);
     writer.number(none);
     for (std::size_t i = 0; i < system_.state.size(); ++i) writer.number(none);
     if (!system_.modes.empty()) writer.text("");
     for (int i = 0; i < 5; ++i) writer.count(0);
+    for (std::size_t k = 0; k < events_; ++k) writer.number(none);
     writer.text(message);
+}
+
+void EnsembleRuns::set_option(const Column& column, double value, Options& options)
+{
+    const std::array<double*, 6> numbers{&options.t_start, &options.t_end,
+                                         &options.rtol,    &options.atol,
+                                         &options.step,    &options.event_tolerance};
+    if (column.index < numbers.size()) {
+        *numbers[column.index] = value;
+    } else if (column.name == "max-steps") {
+        if (!(value >= 1) || !(value < 1e18) || value != std::floor(value)) {
+            throw BadInput(
+                fmt::format("max-steps must be a whole number from 1 on, got {}", value));
+        }
+        options.max_steps = static_cast<std::uint64_t>(value);
+    }
 }
 
 void EnsembleRuns::run_row(std::size_t row, std::string& out) const
@@ -169,11 +202,16 @@ void EnsembleRuns::run_row(std::size_t row, std::string& out) const
         RunSettings settings = settings_;
         for (std::size_t i = 0; i < table_.columns.size(); ++i) {
             const Column& column = table_.columns[i];
-            if (column.parameter) settings.parameters[column.index] = table_.value(row, i);
+            const double value = table_.value(row, i);
+            if (column.is_option) set_option(column, value, settings.options);
+            if (!column.parameter) continue;
+            columns_of(system_).check(column, value, "this row");
+            settings.parameters[column.index] = value;
         }
+        if (sets_options_) validate(settings.options, settings_.fixed_step);
         for (std::size_t i = 0; i < table_.columns.size(); ++i) {
             const Column& column = table_.columns[i];
-            if (column.parameter) continue;
+            if (column.parameter || column.is_option) continue;
             if (settings.start.empty()) settings.start = system_.start(settings.parameters);
             settings.start.at(column.index) = table_.value(row, i);
         }
@@ -181,7 +219,7 @@ void EnsembleRuns::run_row(std::size_t row, std::string& out) const
         const auto run = system_.run(settings, 1).run;
         RowWriter writer(out);
         put_inputs(row, writer);
-        writer.text(name(run.outcome));
+        writer.text(ricochet::name(run.outcome));
         writer.number(run.t);
         for (std::size_t i = 0; i < system_.state.size(); ++i) writer.number(run.x.at(i));
         if (!system_.modes.empty()) writer.text(system_.modes.at(run.mode));
@@ -189,6 +227,10 @@ void EnsembleRuns::run_row(std::size_t row, std::string& out) const
         for (const std::uint64_t count :
              {s.events, s.steps, s.rejected, s.flow_calls, s.guard_calls}) {
             writer.count(count);
+        }
+        for (std::size_t k = 0; k < events_; ++k) {
+            writer.number(k < run.events.size() ? run.events[k].t
+                                                : std::numeric_limits<double>::quiet_NaN());
         }
         writer.text("");
     } catch (const std::exception& error) {

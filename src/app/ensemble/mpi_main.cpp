@@ -53,7 +53,8 @@ private:
 
 int deal(const EnsembleRequest& request)
 {
-    if (!request.system.empty() && find_system(request.system).program != "") {
+    const bool scene = request.system.ends_with(".json");
+    if (!request.system.empty() && !scene && find_system(request.system).program != "") {
         throw BadInput(
             fmt::format("ricochet-mpi runs the systems of the core, got {}; its shares "
                         "are run by ricochet ensemble",

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <numeric>
 #include <optional>
 #include <utility>
@@ -93,18 +94,24 @@ std::optional<std::size_t> parameter_of(const SystemEntry& system, std::size_t c
             known.push_back(component.name);
         }
     }
+    for (const OptionColumn& option : option_columns) known.push_back(option.name);
     const auto nearest = std::min_element(known.begin(), known.end(), [&](auto a, auto b) {
         return distance(a, name) < distance(b, name);
     });
-    throw BadInput(fmt::format(
-        "{}: '{}' is no parameter or state component of {}; the nearest is {}, known are {}", where,
-        shortened(name), system.name, *nearest, joined(known, ", ")));
+    throw BadInput(
+        fmt::format("{}: '{}' is no parameter or state component of {}, and no option; the nearest "
+                    "is {}, known "
+                    "are {}",
+                    where, shortened(name), system.name, *nearest, joined(known, ", ")));
 }
 
 void refuse_twins(const std::vector<Column>& columns, const Column& column, std::string_view where)
 {
     for (const Column& other : columns) {
-        if (other.parameter != column.parameter || other.index != column.index) continue;
+        if (other.is_option != column.is_option || other.parameter != column.parameter ||
+            other.index != column.index || other.target != column.target) {
+            continue;
+        }
         const std::string both = other.name == column.name
                                      ? other.name
                                      : fmt::format("{}, which is {}", column.name, other.name);
@@ -115,7 +122,7 @@ void refuse_twins(const std::vector<Column>& columns, const Column& column, std:
 void check_range(const SystemEntry& system, const Column& column, double value,
                  std::string_view where)
 {
-    if (!column.parameter) return;
+    if (!column.parameter || column.is_option) return;
     const Parameter& parameter = system.parameters[column.index];
     if (parameter.range.contains(value)) return;
     throw BadInput(fmt::format("{}: {} of {} must lie in {}{}, got {}", where, column.name,
@@ -132,8 +139,8 @@ std::string bytes_of(const std::vector<double>& numbers)
 /// Reads a table line by line.
 class TableReader {
 public:
-    TableReader(const SystemEntry& system, std::string file)
-        : system_(system), file_(std::move(file))
+    TableReader(const ColumnSource& source, std::string file)
+        : source_(source), file_(std::move(file))
     {
     }
 
@@ -177,7 +184,7 @@ private:
             const std::string here = where(line, columns_.size());
             const std::size_t bracket = cell.ends_with(']') ? cell.rfind('[') : cell.npos;
             const std::string_view name = trimmed(cell.substr(0, bracket));
-            Column column = column_named(system_, here, name);
+            Column column = source_.column(here, name);
             if (bracket != cell.npos) {
                 const auto unit = cell.substr(bracket + 1, cell.size() - bracket - 2);
                 if (trimmed(unit) != column.unit) {
@@ -201,12 +208,11 @@ private:
         for (std::size_t i = 0; i < row.size(); ++i) {
             const std::string here = where(line, i);
             const double value = number(fmt::format("{}: {}", here, columns_[i].name), row[i]);
-            check_range(system_, columns_[i], value, here);
             numbers_.push_back(value);
         }
     }
 
-    const SystemEntry& system_;
+    const ColumnSource& source_;
     std::string file_;
     std::vector<Column> columns_;
     std::vector<double> numbers_;
@@ -248,10 +254,18 @@ Column column_named(const SystemEntry& system, std::string_view where, std::stri
                 .parameter = parameter.has_value(),
                 .index = parameter.value_or(i)};
     }
+    for (std::size_t k = 0; k < option_columns.size(); ++k) {
+        if (option_columns[k].name != name) continue;
+        return {.name = std::string(name),
+                .unit = std::string(option_columns[k].unit),
+                .parameter = false,
+                .index = k,
+                .is_option = true};
+    }
     refuse_name(system, where, name);
 }
 
-Table read_table(const SystemEntry& system, const std::filesystem::path& file)
+Table read_table(const ColumnSource& source, const std::filesystem::path& file)
 {
     const std::string content = ricochet::detail::read_file(file, [&](const std::string& why) {
         throw BadInput(
@@ -259,7 +273,7 @@ Table read_table(const SystemEntry& system, const std::filesystem::path& file)
     });
     std::string_view rest = content;
     if (rest.starts_with("\xef\xbb\xbf")) rest.remove_prefix(3);  // a byte order mark
-    TableReader reader(system, file.string());
+    TableReader reader(source, file.string());
     for (std::size_t line = 1; !rest.empty(); ++line) {
         const std::size_t end = rest.find('\n');
         reader.take(line, rest.substr(0, end));
@@ -268,39 +282,160 @@ Table read_table(const SystemEntry& system, const std::filesystem::path& file)
     return reader.table();
 }
 
-Table random_table(const SystemEntry& system, const std::vector<std::string>& vary,
-                   std::size_t rows, std::uint64_t seed)
-{
-    Table out{.columns = {}, .rows = rows, .value = {}, .identity = {}};
-    std::vector<std::pair<double, double>> bounds;
-    out.identity = fmt::format("seed {}", seed);
-    for (const std::string& text : vary) {
-        const std::size_t equals = text.find('=');
-        const std::size_t colon = text.find(':', equals == text.npos ? 0 : equals);
-        if (equals == text.npos || equals == 0 || colon == text.npos) {
-            throw BadInput(
-                fmt::format("--vary must be name=lowest:highest, got '{}'", shortened(text)));
+namespace {
+
+/// A rule for the numbers of one column.
+struct Rule {
+    enum class Kind { uniform, log_uniform, normal, grid, log_grid };
+    Kind kind = Kind::uniform;
+    double first = 0, second = 0;
+    std::size_t count = 1;   ///< of a grid
+    std::size_t stride = 1;  ///< rows until its value changes
+
+    [[nodiscard]] double at(std::size_t row, std::uint64_t seed) const
+    {
+        ricochet::detail::SplitMix random(seed);
+        switch (kind) {
+            case Kind::uniform: return random.uniform(first, second);
+            case Kind::log_uniform:
+                return std::clamp(std::exp(random.uniform(std::log(first), std::log(second))),
+                                  first, second);
+            case Kind::normal: {
+                // Of (0, 1], since its logarithm is taken.
+                const double size = std::sqrt(-2 * std::log(1 - random.uniform(0, 1)));
+                return first +
+                       second * size * std::cos(2 * std::numbers::pi * random.uniform(0, 1));
+            }
+            case Kind::grid:
+            case Kind::log_grid: break;
         }
-        const std::string where = fmt::format("--vary {}", shortened(text));
-        Column column = column_named(system, where, text.substr(0, equals));
-        refuse_twins(out.columns, column, where);
-        const double lowest = number(where, text.substr(equals + 1, colon - equals - 1));
-        const double highest = number(where, text.substr(colon + 1));
-        if (!(lowest <= highest)) {
-            throw BadInput(fmt::format("{}: the lowest value is above the highest", where));
-        }
-        check_range(system, column, lowest, where);
-        check_range(system, column, highest, where);
-        bounds.emplace_back(lowest, highest);
-        out.identity += fmt::format(", {}={}:{}", column.name, lowest, highest);
-        out.columns.push_back(std::move(column));
+        const std::size_t k = row / stride % count;
+        if (k == 0) return first;
+        if (k + 1 == count) return second;
+        const double part = static_cast<double>(k) / static_cast<double>(count - 1);
+        if (kind == Kind::grid) return first + part * (second - first);
+        return first * std::pow(second / first, part);
     }
-    out.value = [bounds, seed](std::size_t row, std::size_t column) {
-        const std::uint64_t own = row_seed(row_seed(seed, row), column);
-        const auto [lowest, highest] = bounds[column];
-        return ricochet::detail::SplitMix(own).uniform(lowest, highest);
+};
+
+/// The parts of "name=a:b:c".
+std::pair<std::string, std::vector<std::string>> parts_of(std::string_view text)
+{
+    const std::size_t equals = text.find('=');
+    if (equals == text.npos || equals == 0) return {};
+    std::vector<std::string> parts;
+    for (std::string_view rest = text.substr(equals + 1);;) {
+        const std::size_t colon = rest.find(':');
+        parts.emplace_back(rest.substr(0, colon));
+        if (colon == rest.npos) break;
+        rest.remove_prefix(colon + 1);
+    }
+    return {std::string(text.substr(0, equals)), std::move(parts)};
+}
+
+void require_order(const Rule& rule, std::string_view where)
+{
+    if (!(rule.first <= rule.second)) {
+        throw BadInput(fmt::format("{}: the lowest value is above the highest", where));
+    }
+    const bool log = rule.kind == Rule::Kind::log_uniform || rule.kind == Rule::Kind::log_grid;
+    if (log && !(rule.first > 0)) {
+        throw BadInput(fmt::format("{}: values by their logarithms must be positive, got {}", where,
+                                   rule.first));
+    }
+}
+
+Rule random_rule(const std::vector<std::string>& parts, std::string_view text,
+                 std::string_view where)
+{
+    const std::string kind = parts.size() == 3 ? parts[2] : "uniform";
+    const bool known = kind == "uniform" || kind == "log" || kind == "normal";
+    if (parts.size() < 2 || parts.size() > 3 || !known) {
+        throw BadInput(
+            fmt::format("--vary must be name=lowest:highest, name=lowest:highest:log or "
+                        "name=mean:deviation:normal, got '{}'",
+                        shortened(text)));
+    }
+    Rule rule;
+    rule.first = number(where, parts[0]);
+    rule.second = number(where, parts[1]);
+    if (kind == "normal") {
+        rule.kind = Rule::Kind::normal;
+        if (!(rule.second >= 0)) {
+            throw BadInput(
+                fmt::format("{}: the deviation must not be negative, got {}", where, rule.second));
+        }
+        return rule;
+    }
+    if (kind == "log") rule.kind = Rule::Kind::log_uniform;
+    require_order(rule, where);
+    return rule;
+}
+
+Rule grid_rule(const std::vector<std::string>& parts, std::string_view text, std::string_view where)
+{
+    const bool log = parts.size() == 4 && parts[3] == "log";
+    if (parts.size() < 3 || parts.size() > 4 || (parts.size() == 4 && !log)) {
+        throw BadInput(
+            fmt::format("--grid must be name=first:last:count or "
+                        "name=first:last:count:log, got '{}'",
+                        shortened(text)));
+    }
+    Rule rule{.kind = log ? Rule::Kind::log_grid : Rule::Kind::grid};
+    rule.first = number(where, parts[0]);
+    rule.second = number(where, parts[1]);
+    rule.count = whole_number(where, parts[2], 1, 1'000'000'000);
+    require_order(rule, where);
+    return rule;
+}
+
+}  // namespace
+
+Table made_table(const ColumnSource& source, const std::vector<std::string>& grid,
+                 const std::vector<std::string>& vary, std::size_t repeats, std::uint64_t seed)
+{
+    Table out{
+        .columns = {}, .rows = repeats, .value = {}, .identity = fmt::format("seed {}", seed)};
+    std::vector<Rule> rules;
+    std::size_t points = 1;
+    const auto add = [&](const std::string& text, std::string_view option, const auto& rule_of) {
+        const std::string where = fmt::format("{} {}", option, shortened(text));
+        const auto [name, parts] = parts_of(text);
+        Rule rule = rule_of(parts, text, where);
+        Column column = source.column(where, name);
+        refuse_twins(out.columns, column, where);
+        if (rule.kind != Rule::Kind::normal) {
+            source.check(column, rule.first, where);
+            source.check(column, rule.second, where);
+        }
+        rule.stride = points;
+        points *= rule.count;
+        if (points > 1'000'000'000) {
+            throw BadInput(fmt::format("{}: the grid has more than 1e9 points", where));
+        }
+        rules.push_back(rule);
+        const bool plain = rule.kind == Rule::Kind::uniform;
+        out.identity += plain ? fmt::format(", {}={}:{}", name, rule.first, rule.second)
+                              : fmt::format(", {}", text);
+        out.columns.push_back(std::move(column));
+    };
+    for (const std::string& text : grid) add(text, "--grid", grid_rule);
+    for (const std::string& text : vary) add(text, "--vary", random_rule);
+    out.rows = repeats * points;
+    out.value = [rules, seed](std::size_t row, std::size_t column) {
+        return rules[column].at(row, row_seed(row_seed(seed, row), column));
     };
     return out;
+}
+
+ColumnSource columns_of(const SystemEntry& system)
+{
+    return {[&system](std::string_view where, std::string_view name) {
+                return column_named(system, where, name);
+            },
+            [&system](const Column& column, double value, std::string_view where) {
+                check_range(system, column, value, where);
+            }};
 }
 
 }  // namespace ricochet::app

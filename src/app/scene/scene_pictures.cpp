@@ -35,7 +35,7 @@ std::vector<Vector2> displacements(const Scene::Surface& surface, const SceneRun
     return out;
 }
 
-/// The points of terrain; those of an arc at every third of a degree at least.
+/// The points of terrain; those of an arc at every third degree at least.
 std::vector<Vector2> points_of(const Scene::Surface& surface)
 {
     if (!surface.is_arc()) return surface.points;
@@ -46,7 +46,7 @@ std::vector<Vector2> points_of(const Scene::Surface& surface)
     const double from = angle_of(surface.points.front());
     double sweep = angle_of(surface.points.back()) - from;
     if (sweep <= 0) sweep += turn;
-    const auto count = static_cast<int>(std::ceil(1080 * sweep / turn));
+    const auto count = static_cast<int>(std::ceil(120 * sweep / turn));
     std::vector<Vector2> points;
     for (int k = 0; k <= count; ++k) {
         const double angle = from + sweep * k / count;

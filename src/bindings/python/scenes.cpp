@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <memory>
@@ -15,6 +16,7 @@
 
 #include "arrays.hpp"
 #include "background.hpp"
+#include "ricochet/scene/measure.hpp"
 #include "ricochet/scene/scene.hpp"
 #include "ricochet/scene/simulate.hpp"
 
@@ -344,6 +346,42 @@ template <class Of>
         "statistics"_a = counts_of(run.statistics));
 }
 
+/// Runs a gas from its start, and measures it from t_start to t_end. `lengths` [m] of surfaces, NaN
+/// where they are not known.
+[[nodiscard]] py::dict measured(const PyScene& of, double t_start, double t_end, std::size_t blocks,
+                                double area, const std::vector<double>& lengths,
+                                const py::dict& given)
+{
+    SceneOptions options = options_for(of, given);
+    options.t_end = t_end;
+    options.record_events = false;
+    SceneMeasure measure(of.scene,
+                         {.t_start = t_start, .t_end = t_end, .blocks = blocks, .area = area});
+    for (std::uint32_t s = 0; s < lengths.size(); ++s) {
+        if (!std::isnan(lengths[s])) measure.length_of(SurfaceId{s}, lengths[s]);
+    }
+    options.observe = [&](const SceneEvent& event) { measure.add(event); };
+    Background<int> background(nullptr);
+    options.cancelled = &background.stopped();
+    SceneRun run;
+    background.run([&] { run = simulate(of.scene, options); });
+    if (background.raised()) {
+        background.raised()->restore();
+        throw py::error_already_set();
+    }
+    using namespace py::literals;
+    const SceneMeasures found = measure.result();
+    const auto pair = [](const Measured& m) { return std::pair(m.mean, m.error); };
+    std::vector<std::pair<double, double>> surfaces;
+    for (const Measured& pressure : found.surface_pressure) surfaces.push_back(pair(pressure));
+    return py::dict(
+        "outcome"_a = std::string(name(run.outcome)), "message"_a = run.message,
+        "collision_rate"_a = pair(found.collision_rate), "wall_rate"_a = pair(found.wall_rate),
+        "temperature"_a = pair(found.temperature),
+        "virial_pressure"_a = pair(found.virial_pressure),
+        "mean_free_path"_a = pair(found.mean_free_path), "surface_pressure"_a = surfaces);
+}
+
 using Rows = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
 /// Energies at some times, of positions and velocities of shape (times, bodies, 2).
@@ -546,6 +584,7 @@ PYBIND11_MODULE(_scenes, module)
                         const std::string& name) { return self.scene.body(name).index; })
         .def("check", [](const PyScene& self, double t) { self.scene.check(t); })
         .def("simulate", &simulated)
+        .def("measure", &measured)
         .def("explain",
              [](const PyScene& self, const py::dict& given) {
                  return explain(self.scene, options_for(self, given));
