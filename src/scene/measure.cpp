@@ -197,4 +197,48 @@ PairDistribution pair_distribution(const Scene& scene, const SceneRun& run, doub
     return out;
 }
 
+TemperatureProfile temperature_profile(const Scene& scene, const SceneRun& run, std::size_t axis,
+                                       double low, double high, std::size_t slices)
+{
+    constexpr std::string_view who_asks = "temperature_profile";
+    require(axis < 2, who_asks, "axis", "be 0 or 1", static_cast<double>(axis));
+    require_finite(who_asks, "low", low);
+    require_above(who_asks, "high", high, "low", low);
+    require(slices > 0, who_asks, "slices", "be one at least", 0);
+    if (run.samples.empty()) Refuse{who_asks}("the run has no samples; expected sample_times");
+    struct Slice {
+        double count = 0, mass = 0, squares = 0;
+        Vector2 momentum{};
+    };
+    const double width = (high - low) / static_cast<double>(slices);
+    std::vector<std::vector<double>> found(slices);
+    for (const std::vector<BodyState>& states : run.samples) {
+        std::vector<Slice> sums(slices);
+        for (std::size_t i = 0; i < states.size(); ++i) {
+            const double place = states[i].at[axis];
+            if (!(place >= low && place < high)) continue;
+            const auto k = static_cast<std::size_t>((place - low) / width);
+            Slice& slice = sums[std::min(k, slices - 1)];
+            const double mass = scene.bodies()[i].mass;
+            const Vector2& v = states[i].velocity;
+            slice.count += 1;
+            slice.mass += mass;
+            slice.squares += mass * dot(v, v);
+            slice.momentum = slice.momentum + mass * v;
+        }
+        for (std::size_t k = 0; k < slices; ++k) {
+            const Slice& slice = sums[k];
+            if (slice.count < 2) continue;
+            const double thermal = slice.squares - dot(slice.momentum, slice.momentum) / slice.mass;
+            found[k].push_back(thermal / (2 * slice.count - 2));
+        }
+    }
+    TemperatureProfile out;
+    for (std::size_t k = 0; k < slices; ++k) {
+        out.places.push_back(low + (static_cast<double>(k) + 0.5) * width);
+        out.values.push_back(mean_of(found[k]));
+    }
+    return out;
+}
+
 }  // namespace ricochet

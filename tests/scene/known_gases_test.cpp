@@ -248,6 +248,55 @@ TEST(KnownGases, PairsBelowADiameterAreAbsentAndFarOnesAreEven)
     EXPECT_NEAR(far, 1, 0.02);
 }
 
+TEST(KnownGases, ATemperatureProfileFollowsItsSlices)
+{
+    // Two bodies at rest on the mean in each slice: m v^2 / 1 of one, and of three slices the last
+    // is empty. Drift of a slice is no temperature.
+    Scene scene;
+    scene.disc({.at = {0.25, 0}, .velocity = {6, 0}, .radius = 0.1, .mass = 2});
+    scene.disc({.at = {0.75, 5}, .velocity = {4, 0}, .radius = 0.1, .mass = 2});
+    scene.disc({.at = {1.25, 0}, .velocity = {0, 3}, .radius = 0.1});
+    scene.disc({.at = {1.75, 5}, .velocity = {0, -3}, .radius = 0.1});
+    const SceneRun run = simulate(scene, {.t_end = 0.01, .sample_times = {0, 0.005}});
+    const TemperatureProfile profile = temperature_profile(scene, run, 0, 0, 3, 3);
+    ASSERT_EQ(profile.values.size(), 3U);
+    EXPECT_EQ(profile.places[1], 1.5);
+    EXPECT_EQ(profile.values[0].mean, 2);
+    EXPECT_EQ(profile.values[0].error, 0);
+    EXPECT_EQ(profile.values[1].mean, 9);
+    EXPECT_TRUE(std::isnan(profile.values[2].mean));
+    EXPECT_THROW((void)temperature_profile(scene, run, 2, 0, 1, 1), std::invalid_argument);
+    EXPECT_THROW((void)temperature_profile(scene, run, 0, 1, 1, 1), std::invalid_argument);
+}
+
+TEST(KnownGases, HeatFlowsBetweenThermalWalls)
+{
+    // Points that meet nothing but two thermal walls, of temperatures 1 and 4: those on the way
+    // from a wall are Maxwell's of it. Of each temperature T there are as many as fly for 1 /
+    // sqrt(T), so the mean of v^2 across is (sqrt(1) + sqrt(4)) / (1 + 1/2) = 2 everywhere: within
+    // 4 standard errors over independent points, for which the mean over time is taken.
+    Scene scene;
+    scene.wall({.point = {0, 0}, .normal = {1, 0}, .temperature = 1});
+    scene.wall({.point = {1, 0}, .normal = {-1, 0}, .temperature = 4});
+    for (int i = 0; i < 50; ++i) {
+        scene.point({.at = {0.02 * i + 0.01, 0}, .velocity = {1, 0}});
+    }
+    std::vector<double> times;
+    for (int k = 0; k < 2000; ++k) times.push_back(20 + 0.25 * k);
+    const SceneRun run =
+        simulate(scene, {.t_end = 520, .record_events = false, .sample_times = times});
+    ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+    std::vector<double> across;
+    for (std::size_t i = 0; i < 50; ++i) {
+        double sum = 0;
+        for (const auto& states : run.samples) sum += std::pow(states[i].velocity[1], 2);
+        across.push_back(sum / 2000);
+    }
+    const Measured mean = mean_of(across);
+    EXPECT_NEAR(mean.mean, 2, 4 * mean.error);
+    EXPECT_LT(mean.error, 0.05);
+}
+
 TEST(KnownGases, MeasuresThatCannotBeTakenAreRefused)
 {
     const Scene scene = torus_gas(2, 0.1, 1, 1);

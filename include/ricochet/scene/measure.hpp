@@ -108,4 +108,19 @@ struct PairDistribution {
 [[nodiscard]] PairDistribution pair_distribution(const Scene& scene, const SceneRun& run,
                                                  double distance, std::size_t bins);
 
+/// Temperatures along an axis.
+struct TemperatureProfile {
+    std::vector<double> places;    ///< [m] middles of the slices
+    std::vector<Measured> values;  ///< [J] kT, over the samples; NaN where there were none
+};
+
+/// Temperatures of the samples of a run in slices of equal width from `low` to `high` [m] along x
+/// (`axis` 0) or y (1): the kinetic energy of the centres about the mean velocity of their slice,
+/// in two directions. Samples with fewer than two bodies in a slice do not count there. Errors
+/// treat samples as independent.
+/// @throws std::invalid_argument for an empty interval, no slices or no samples.
+[[nodiscard]] TemperatureProfile temperature_profile(const Scene& scene, const SceneRun& run,
+                                                     std::size_t axis, double low, double high,
+                                                     std::size_t slices);
+
 }  // namespace ricochet
