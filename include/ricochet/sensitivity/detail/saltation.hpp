@@ -183,7 +183,7 @@ public:
         Undefined undefined = Undefined::no;
         if (fired.size() == 0) {
             undefined = pass_time_event(motion, last);
-        } else if constexpr (Guarded<System, X>) {
+        } else if constexpr (Resetting<System, X>) {
             undefined = pass_guards(fired, after, motion, last);
         }
         if (undefined == Undefined::no && !motion.derivatives.allFinite()) {
@@ -420,7 +420,7 @@ private:
     [[nodiscard]] bool meets_others(std::vector<std::size_t> acting, const Motion<X>& motion,
                                     const LastEvent& last) const
     {
-        if constexpr (Guarded<System, X>) {
+        if constexpr (Resetting<System, X>) {
             if (coincides(last, motion.t)) return false;
             const std::size_t fired = acting.size();
             std::vector<std::size_t> returning;
