@@ -12,6 +12,8 @@ from ._compiled import C_FLOW, C_GUARD, C_JACOBIAN, C_RATE, C_RESET, Compiled
 from ._ensemble import Ensemble, ensemble, row_seed
 from ._filippov import Filippov
 from ._fmu import Fmu, FmuRun, load_fmu
+from ._gradient import (Adjoint, Gradient, Perceptron, adjoint, find_periodic_orbit, gradient,
+                        monodromy, sensitivities)
 from ._inclusion import Inclusion
 from ._ivp import solve_ivp
 from ._monitor import Cut, Monitor, Verdict
@@ -28,10 +30,11 @@ from ._training import Certified, Trained, certify, train_classifier, train_gate
 globals().update(_READY)  # BouncingBall and the other ready systems
 
 __all__ = [
-    "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified", "Compiled", "Cut",
-    "Ensemble", "Filippov", "Fmu", "FmuRun", "Guard", "Inclusion", "Kind", "Monitor", "Network",
-    "OdeResult", "Run", "Scene", "SceneKind", "SceneRun", "Simulation", "Snapshot", "Solution",
-    "Stop", "System", "Times", "Trained", "Verdict", "certify", "ensemble", "every", "guard",
-    "integrate", "load_fmu", "plot", "row_seed", "solve_ivp", "train_classifier", "train_gate",
+    "Adjoint", "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified", "Compiled", "Cut",
+    "Ensemble", "Filippov", "Fmu", "FmuRun", "Gradient", "Guard", "Inclusion", "Kind", "Monitor",
+    "Network", "OdeResult", "Perceptron", "Run", "Scene", "SceneKind", "SceneRun", "Simulation",
+    "Snapshot", "Solution", "Stop", "System", "Times", "Trained", "Verdict", "adjoint", "certify",
+    "ensemble", "every", "find_periodic_orbit", "gradient", "guard", "integrate", "load_fmu",
+    "monodromy", "plot", "row_seed", "sensitivities", "solve_ivp", "train_classifier", "train_gate",
     *_READY,
 ]

@@ -139,6 +139,17 @@ def scene() -> None:
     assert run.events["kind"][0] == ricochet.SceneKind.IMPACT and run.energy_at_end > 0
 
 
+def differentiated() -> None:
+    """The gradient of a time of impact."""
+    try:
+        found: ricochet.Gradient = ricochet.gradient(lambda run: run.event_times[0],
+                                                     ricochet.BouncingBall(), [10.0, 0.0], 2.0)
+    except ImportError:  # a package without gradients
+        return
+    run: ricochet.Adjoint = ricochet.adjoint(ricochet.BouncingBall(), [10.0, 0.0], 2.0)
+    assert abs(found.x0[0] - run.event_times[0] / 20) < 1e-9 and run.undefined_at is None
+
+
 def refused() -> None:
     """Mistakes that the types show: strict checking complains where an error is missing."""
     try:
@@ -156,5 +167,5 @@ def refused() -> None:
 
 
 if __name__ == "__main__":
-    for example in (solved, integrated, driven, many, watched, stiff, sliding, scene, refused):
+    for example in (solved, integrated, driven, many, watched, stiff, sliding, scene, differentiated, refused):
         example()

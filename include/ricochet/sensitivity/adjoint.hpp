@@ -83,7 +83,7 @@ struct Gradient {
 };
 
 /// A run that can be taken back. It is not changed by gradients, of which it has any number, so
-/// that threads may share it.
+/// that threads may use it together.
 template <class X>
 class Adjoint {
 public:

@@ -28,7 +28,7 @@ namespace ricochet {
 /// Parameters are numbered layer by layer, in each layer the weights row by row (outputs x inputs)
 /// and then the biases, as `torch.nn.Linear` lists them. Offset, scale and threshold of the model
 /// are not applied, as by `Mlp`. ReLU has the derivative 0 at 0. Immutable, so that threads may
-/// share it; copies share the parameters.
+/// use it together; copies have common parameters.
 class DifferentiableMlp {
 public:
     /// @throws std::invalid_argument as `Mlp`

@@ -6,6 +6,8 @@
 //     flow_vjp([mode,] t, x, weights, to)             adds w . (df/dx, df/dt, df/dp)
 //     guard_vjp([which,] [mode,] t, x, weight, to)
 //     reset_vjp([which,] [mode,] t, x, weights, to)   x: the state before the reset
+//     time_reset_vjp([mode,] t, x, weights, to)
+//     rest_vjp(which, mode, t, x, weights, to)
 //
 // Each is optional and const; x and weights are states, `to` is a `Cotangent`.
 #pragma once
@@ -223,7 +225,7 @@ public:
     void reset_back(std::size_t which, Mode mode, double t, std::span<const double> x,
                     std::span<const double> weights, const Cotangent& to) const override
     {
-        if (which == no_guard) return back_through(TimeReset{}, mode, t, x, weights, to);
+        if (which == no_guard) return time_reset_back(mode, t, x, weights, to);
         if constexpr (Resetting<System, X>) {
             const X at = state_of_numbers<X>(x);
             const X w = state_of_numbers<X>(weights);
@@ -246,11 +248,31 @@ public:
                    std::span<const double> weights, const Cotangent& to) const override
     {
         if constexpr (Resting<System, X>) {
-            back_through(RestOf{which}, mode, t, x, weights, to);
+            const X at = state_of_numbers<X>(x);
+            const X w = state_of_numbers<X>(weights);
+            if constexpr (requires { system_.rest_vjp(which, mode, t, at, w, to); }) {
+                system_.rest_vjp(which, mode, t, at, w, to);
+            } else {
+                back_through(RestOf{which}, mode, t, x, weights, to);
+            }
         }
     }
 
 private:
+    void time_reset_back(Mode mode, double t, std::span<const double> x,
+                         std::span<const double> weights, const Cotangent& to) const
+    {
+        const X at = state_of_numbers<X>(x);
+        const X w = state_of_numbers<X>(weights);
+        if constexpr (requires { system_.time_reset_vjp(mode, t, at, w, to); }) {
+            system_.time_reset_vjp(mode, t, at, w, to);
+        } else if constexpr (requires { system_.time_reset_vjp(t, at, w, to); }) {
+            system_.time_reset_vjp(t, at, w, to);
+        } else {
+            back_through(TimeReset{}, mode, t, x, weights, to);
+        }
+    }
+
     static constexpr bool reset_recorded = !Resetting<System, X> ||
                                            ResetTakes<Made, Reverse, States> ||
                                            ResetTakes<Made, Reverse, States, std::size_t>;
