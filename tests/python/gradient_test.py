@@ -162,6 +162,28 @@ def test_a_forced_orbit_with_an_impact():
     assert abs(orbit.multipliers[0]) < 1  # it attracts
 
 
+def test_the_limit_cycle_of_a_clock():
+    # A damped pendulum that gets a kick k whenever it passes its lowest point upward: after a period
+    # T = 2 pi / w, w^2 = 1 - d^2, the speed v is v exp(-d T) + k.
+    damping, kick = 0.1, 0.3
+    system = System(lambda t, x, d, k: [x[1], -x[0] - 2 * d * x[1]],
+                    [Guard(lambda t, x, d, k: x[0], name="lowest", direction=1,
+                           reset=lambda t, x, d, k: [x[0], x[1] + k])])
+    w = math.sqrt(1 - damping**2)
+    period = 2 * math.pi / w
+    left = math.exp(-damping * period)
+    # A quarter of a period behind the kick, where the angle is about that of the cycle.
+    speed = kick / (1 - left)
+    t = period / 4
+    start = [speed / w * math.exp(-damping * t) * 1.05, 0.02]
+    orbit = ricochet.find_periodic_orbit(system, start, 1.02 * period, autonomous=True,
+                                         args=(damping, kick))
+    assert orbit.converged, orbit.message
+    assert orbit.period == pytest.approx(period, rel=1e-9)
+    multipliers = sorted(orbit.multipliers.real)
+    assert multipliers == pytest.approx([left, 1], abs=1e-8)
+
+
 def test_behind_a_grazing_event_the_gradient_is_nan():
     system = System(lambda t, x: [x[1], -x[0]],
                     [Guard(lambda t, x: 1 - 1e-10 - x[0], name="wall",
