@@ -184,6 +184,43 @@ def test_the_limit_cycle_of_a_clock():
     assert multipliers == pytest.approx([left, 1], abs=1e-8)
 
 
+def test_spikes_of_an_integrate_and_fire_neuron():
+    # v' = I - v from 0 to the threshold 1: ln(I / (I - 1)) from spike to spike.
+    system = System(lambda t, v, current: [current - v[0]],
+                    [Guard(lambda t, v, current: 1 - v[0], name="spike",
+                           reset=lambda t, v, current: [0])])
+    current = 1.5
+    found = ricochet.gradient(lambda run: run.event_times[4], system, [0.0], 8, args=[current],
+                              rtol=1e-11, atol=1e-11)
+    assert found.value == pytest.approx(5 * math.log(3), rel=1e-10)
+    assert found.args[0] == pytest.approx(-5 / (current * (current - 1)), rel=1e-9)
+    assert found.x0[0] == pytest.approx(-1 / current, rel=1e-9)  # v0 is worth -dv / I of time
+
+
+def test_a_billiard_in_a_circle():
+    def reset(t, x):
+        along = x[0] * x[2] + x[1] * x[3]
+        size = x[0] * x[0] + x[1] * x[1]
+        return [x[0], x[1], x[2] - 2 * along / size * x[0], x[3] - 2 * along / size * x[1]]
+    table = System(lambda t, x: [x[2], x[3], 0, 0],
+                   [Guard(lambda t, x: 1 - x[0] * x[0] - x[1] * x[1], name="cushion", reset=reset,
+                          unilateral=True)])
+    start, t_end = np.array([0.1, -0.2, 1.0, 0.7]), 9.0
+
+    def loss(run):
+        return run.x[0] + 0.3 * run.x[3] + run.event_times[-1]
+
+    def value(h, i):
+        moved = start.copy()
+        moved[i] += h
+        return ricochet.gradient(loss, table, moved, t_end).value
+    found = ricochet.gradient(loss, table, start, t_end)
+    for i in range(4):
+        h = 1e-4  # every cushion magnifies; the fifth derivative is of size 1e6
+        expected = (8 * (value(h, i) - value(-h, i)) - value(2 * h, i) + value(-2 * h, i)) / (12 * h)
+        assert found.x0[i] == pytest.approx(expected, rel=1e-8)
+
+
 def test_behind_a_grazing_event_the_gradient_is_nan():
     system = System(lambda t, x: [x[1], -x[0]],
                     [Guard(lambda t, x: 1 - 1e-10 - x[0], name="wall",
