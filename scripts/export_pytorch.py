@@ -13,6 +13,11 @@ seeded, in float32 or float64, so that the export can be tried:
 sample, recorded with the logits that PyTorch computes from it and computed again at
 every load: a layer transposed, an activation or a scale forgotten, and the file is
 refused.
+
+`export_guard` writes a network that is a guard (nn/guard_network.hpp): a Sequential of
+Linear layers with the same ReLU, Tanh, Softplus, SiLU, or module named Sin or Sine after
+each but the last. A module named Residual in it holds a Linear layer and its activation,
+as a Sequential or as its children in this order, and returns x + activation(linear(x)).
 """
 
 import json
@@ -22,8 +27,8 @@ import sys
 import torch
 
 
-def export(path, network, about, features):
-    linear = [layer for layer in network if isinstance(layer, torch.nn.Linear)]
+def export(path, network, about, features, linear=None):
+    linear = linear or [layer for layer in network if isinstance(layer, torch.nn.Linear)]
     text = lambda numbers: " ".join(map(repr, numbers))  # shortest decimals that read back the same
     given = zip(features, *([float(word) for word in about[key].split()] for key in ("offset", "scale")))
     x = torch.tensor([(value - offset) * scale for value, offset, scale in given], dtype=linear[0].weight.dtype)
@@ -35,6 +40,75 @@ def export(path, network, about, features):
         header[name] = {"dtype": dtype, "shape": list(tensor.shape), "data_offsets": [begin, len(data)]}
     with open(path, "wb") as file:
         file.write(struct.pack("<Q", len(json.dumps(header))) + json.dumps(header).encode() + data)
+
+
+ACTIVATIONS = {"ReLU": "relu", "Tanh": "tanh", "Softplus": "softplus", "SiLU": "silu", "Sin": "sin", "Sine": "sin"}
+
+
+def layers_of(network):
+    """The Linear layers of a guard, its activation, and the numbers of its residual layers."""
+    linear, found, residual = [], set(), []
+    expects_activation = False
+
+    def refuse(what):
+        raise ValueError(f"export_guard: {what}")
+
+    def visit(module):
+        nonlocal expects_activation
+        kind = type(module).__name__
+        if kind == "Linear":
+            if expects_activation:
+                refuse(f"expected an activation before Linear layer {len(linear)}")
+            linear.append(module)
+            expects_activation = True
+        elif kind in ACTIVATIONS:
+            if not expects_activation:
+                refuse(f"expected a Linear layer before {kind}")
+            if kind == "Softplus" and (module.beta != 1 or module.threshold < 20):
+                refuse(f"expected Softplus of beta 1, found beta {module.beta}, threshold {module.threshold}")
+            found.add(ACTIVATIONS[kind])
+            expects_activation = False
+        elif kind in ("Sequential", "Residual"):
+            first = len(linear)
+            for child in module.children():
+                visit(child)
+            if kind == "Residual":
+                if len(linear) != first + 1 or expects_activation:
+                    refuse("expected one Linear layer and its activation in a Residual")
+                residual.append(first)
+        else:
+            refuse(f"expected Linear, Residual or one of {', '.join(ACTIVATIONS)}, found {kind}")
+
+    visit(network)
+    if not linear or not expects_activation:
+        refuse("expected a Linear layer at the end")
+    if len(found) > 1:
+        refuse(f"expected the same activation after each layer, found {' and '.join(sorted(found))}")
+    return linear, found.pop() if found else "relu", residual
+
+
+def export_guard(path, network, features, offset=None, scale=None, domain=None, system="", seed=0):
+    """Writes a guard. It is evaluated at (features - offset) scale, by default of 0 and 1; `domain`
+    holds lower and upper bounds for each feature, by default none."""
+    linear, activation, residual = layers_of(network)
+    inputs = len(features)
+    text = lambda numbers: " ".join(map(repr, map(float, numbers)))
+    about = {
+        "kind": "guard",
+        "system": system,
+        "parameters": "",
+        "recipe": "state",
+        "offset": text(offset or [0.0] * inputs),
+        "scale": text(scale or [1.0] * inputs),
+        "domain": text(domain) if domain else " ".join(["-inf inf"] * inputs),
+        "activation": activation,
+        "threshold": "0",
+        "step_range": "0 0",
+        "seed": str(seed),
+    }
+    if residual:
+        about["residual"] = " ".join(map(str, residual))
+    export(path, network, about, features, linear)
 
 
 if __name__ == "__main__":

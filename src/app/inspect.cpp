@@ -122,7 +122,7 @@ std::string shape(const Model& model)
 
 std::string_view activation(const Model& model)
 {
-    return model.activation == Activation::relu ? "relu" : "tanh";
+    return name(model.activation);
 }
 
 std::string_view precision(const Model& model)

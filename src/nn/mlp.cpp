@@ -131,6 +131,14 @@ template <class T>
 Mlp<T>::Mlp(const Model& model, const MlpOptions& options)
 {
     detail::check_layers(model, "Mlp");
+    if (model.activation != Activation::relu && model.activation != Activation::tanh) {
+        throw std::invalid_argument("Mlp: expected the activation relu or tanh, found " +
+                                    std::string(name(model.activation)) +
+                                    "; a guard is a GuardNetwork");
+    }
+    if (!model.residual.empty()) {
+        throw std::invalid_argument("Mlp: found residual layers; a guard is a GuardNetwork");
+    }
     if (!supported(options.instruction_set)) {
         throw std::invalid_argument("Mlp: instruction set " +
                                     std::string(name(options.instruction_set)) +

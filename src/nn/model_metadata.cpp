@@ -11,8 +11,10 @@
 namespace ricochet::model_file {
 namespace {
 
-constexpr std::array<std::string_view, 5> known_kinds{"event-classifier", "gate-horizon",
-                                                      "gate-level", "step-policy", "step-actor"};
+constexpr std::array<std::string_view, 6> known_kinds{
+    "event-classifier", "gate-horizon", "gate-level", "step-policy", "guard", "step-actor"};
+constexpr std::array<Activation, 5> activations{
+    Activation::relu, Activation::tanh, Activation::softplus, Activation::silu, Activation::sine};
 
 class Metadata {
 public:
@@ -139,6 +141,36 @@ void read_gate(const Metadata& metadata, const Refusal& refuse, Model& model)
     }
 }
 
+/// Guards have any activation, other networks ReLU or tanh.
+Activation read_activation(const Metadata& metadata, bool is_guard, const Refusal& refuse)
+{
+    const std::string& found = metadata.text("activation");
+    const std::size_t count = is_guard ? activations.size() : 2;
+    for (std::size_t k = 0; k < count; ++k) {
+        if (found == name(activations[k])) return activations[k];
+    }
+    refuse(
+        "metadata \"activation\"",
+        is_guard ? "\"relu\", \"tanh\", \"softplus\", \"silu\" or \"sin\"" : "\"relu\" or \"tanh\"",
+        in_quotes(found));
+}
+
+/// Reads which layers of a guard are residual.
+void read_residual(const Metadata& metadata, const Refusal& refuse, Model& model)
+{
+    const std::string what = "metadata \"residual\"";
+    if (model.kind != "guard") refuse(what, "none in a model that is no guard", "this");
+    for (const double k : metadata.numbers("residual")) {
+        const double before =
+            model.residual.empty() ? -1 : static_cast<double>(model.residual.back());
+        const double last = static_cast<double>(model.layers.size()) - 1;
+        if (!(k > before && k < last && k == std::floor(k))) {
+            refuse(what, "numbers of layers before the last that rise", decimal(k));
+        }
+        model.residual.push_back(static_cast<std::size_t>(k));
+    }
+}
+
 std::string join(const std::vector<double>& values)
 {
     std::string text;
@@ -180,15 +212,12 @@ void read_metadata(const Header& header, const Refusal& refuse, Model& model)
     if (std::ranges::find(known_kinds, model.kind) == known_kinds.end()) {
         refuse("metadata \"kind\"",
                in_quotes(known_kinds[0]) + ", " + in_quotes(known_kinds[1]) + ", " +
-                   in_quotes(known_kinds[2]) + ", " + in_quotes(known_kinds[3]) + " or " +
-                   in_quotes(known_kinds[4]),
+                   in_quotes(known_kinds[2]) + ", " + in_quotes(known_kinds[3]) + ", " +
+                   in_quotes(known_kinds[4]) + " or " + in_quotes(known_kinds[5]),
                in_quotes(model.kind));
     }
-    const std::string& activation = metadata.text("activation");
-    if (activation != "relu" && activation != "tanh") {
-        refuse("metadata \"activation\"", "\"relu\" or \"tanh\"", in_quotes(activation));
-    }
-    model.activation = activation == "relu" ? Activation::relu : Activation::tanh;
+    model.activation = read_activation(metadata, model.kind == "guard", refuse);
+    if (metadata.has("residual")) read_residual(metadata, refuse, model);
 
     model.system = metadata.text("system");
     model.parameters = metadata.named_numbers("parameters");
@@ -263,7 +292,7 @@ std::map<std::string, std::string> metadata_of(const Model& model, const SelfTes
         {"offset", join(model.offset)},
         {"scale", join(model.scale)},
         {"domain", join(domain)},
-        {"activation", model.activation == Activation::relu ? "relu" : "tanh"},
+        {"activation", std::string(name(model.activation))},
         {"threshold", decimal(model.threshold)},
         {"step_range", join({model.step_min, model.step_max})},
         {"seed", std::to_string(model.seed)},
@@ -271,6 +300,9 @@ std::map<std::string, std::string> metadata_of(const Model& model, const SelfTes
         {"self_test_output", join(self_test.output)},
     };
     if (!model.certificate.empty()) metadata["certificate"] = model.certificate;
+    if (!model.residual.empty()) {
+        metadata["residual"] = join({model.residual.begin(), model.residual.end()});
+    }
     if (!model.levels.empty()) metadata["levels"] = join(pairs(model.levels));
     if (const Calibration& c = model.calibration; c.events > 0) {
         metadata["calibration"] = std::to_string(c.events) + ' ' + std::to_string(c.misses) + ' ' +

@@ -220,7 +220,7 @@ std::vector<std::byte> to_safetensors(const Model& model, const LoadOptions& opt
 {
     const Refusal refuse("model");
     // Checked first, so that nothing below reads beyond a vector that is too short.
-    static_cast<void>(classifier_of(model, refuse));
+    static_cast<void>(Outputs(model, refuse));
     const bool tested = !model.self_test.input.empty() || !model.self_test.output.empty();
     const SelfTest self_test = tested ? model.self_test : make_self_test(model, refuse);
 

@@ -585,7 +585,8 @@ TEST(Safetensors, RefusesAnotherVersionKindOrActivation)
     EXPECT_EQ(
         refusal_with_metadata("kind", "poet"),
         "m.safetensors: metadata \"kind\": expected \"event-classifier\", "
-        "\"gate-horizon\", \"gate-level\", \"step-policy\" or \"step-actor\", found \"poet\"");
+        "\"gate-horizon\", \"gate-level\", \"step-policy\", \"guard\" or \"step-actor\", found "
+        "\"poet\"");
     EXPECT_EQ(refusal_with_metadata("activation", "gelu"),
               "m.safetensors: metadata \"activation\": expected \"relu\" or \"tanh\", "
               "found \"gelu\"");

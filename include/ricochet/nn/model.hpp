@@ -15,8 +15,18 @@
 
 namespace ricochet {
 
-/// Activation after every hidden layer; the last layer is linear.
-enum class Activation { relu, tanh };
+/// Activation after every hidden layer; the last layer is linear. Networks other than guards have
+/// one of the first two.
+enum class Activation {
+    relu,
+    tanh,
+    softplus,  ///< log(1 + exp(x))
+    silu,      ///< x / (1 + exp(-x))
+    sine,
+};
+
+/// Name of an activation as model files spell it: "relu", "tanh", "softplus", "silu" or "sin".
+[[nodiscard]] std::string_view name(Activation activation) noexcept;
 
 /// Type in which the weights are stored, and in whose arithmetic they are evaluated.
 enum class Precision { f32, f64 };
@@ -67,7 +77,7 @@ struct Calibration {
 ///
 /// with `features` computed from (t, x, h) by the recipe of that name.
 struct Model {
-    /// Kind of the model; also "gate-horizon", "gate-level", "step-policy", "step-actor".
+    /// Kind of the model; also "guard", "gate-horizon", "gate-level", "step-policy", "step-actor".
     std::string kind = "event-classifier";
     std::string system;                        ///< e.g. "bouncing-ball"
     std::map<std::string, double> parameters;  ///< of the system, those the model depends on
@@ -86,6 +96,8 @@ struct Model {
     std::string certificate;          ///< empty: none
     std::vector<GateLevel> levels{};  ///< decisions of a gate; else empty
     Calibration calibration{};        ///< measured behaviour of a gate
+    /// Layers of a guard whose input is added to their output after the activation, ascending.
+    std::vector<std::size_t> residual{};
 };
 
 // Models in files: the safetensors format, with provenance in its metadata.
@@ -97,13 +109,15 @@ struct Model {
 //     layers.<k>.bias     outputs
 //     __metadata__        strings; numbers in decimal, lists separated by spaces
 //         ricochet           "1", the version of this list
-//         kind               "event-classifier", "gate-horizon", "gate-level" or "step-policy"
+//         kind               "event-classifier", "guard", "gate-horizon", "gate-level" or
+//                            "step-policy"
 //         system             name
 //         parameters         name=value ...
 //         recipe             name of what is computed from (t, x, h)
 //         offset, scale      one number per feature
 //         domain             lower and upper per feature
-//         activation         "relu" or "tanh"
+//         activation         "relu" or "tanh"; of a guard also "softplus", "silu" or "sin"
+//         residual           of a guard, optional: layers to whose output their input is added
 //         threshold          number
 //         step_range         smallest and largest step [s]
 //         seed               integer

@@ -207,9 +207,7 @@ void bind_network(py::module_& module)
         .def_property_readonly("seed", meta(&Model::seed), "The seed of its training.")
         .def_property_readonly(
             "activation",
-            [](const PyNetwork& self) {
-                return self.model()->activation == Activation::relu ? "relu" : "tanh";
-            },
+            [](const PyNetwork& self) { return std::string(name(self.model()->activation)); },
             "What follows every hidden layer.")
         .def_property_readonly(
             "precision",
