@@ -141,6 +141,8 @@ namespace detail {
 void validate(const PlannerOptions& options);
 /// @throws std::invalid_argument because EveryK needs at least one step.
 [[noreturn]] void throw_no_steps_between_checks();
+/// @throws std::invalid_argument because an interval of Enclosed needs at least one step.
+[[noreturn]] void throw_no_steps_in_interval();
 /// @throws std::invalid_argument if SlopeSkip's fraction is not in (0, 1], or it has no steps.
 [[noreturn]] void throw_bad_slope_skip(double fraction, std::size_t longest);
 

@@ -7,6 +7,7 @@
 
 #include "ricochet/bernstein.hpp"
 #include "ricochet/bounds.hpp"
+#include "ricochet/enclosed.hpp"
 #include "ricochet/extremum.hpp"
 #include "ricochet/filippov.hpp"
 #include "ricochet/gates.hpp"

@@ -108,7 +108,8 @@ struct Statistics {
     std::uint64_t checks_deferred =
         0;  ///< steps whose exact check a network or a plan deferred for good
     std::uint64_t outside_domain = 0;  ///< states outside the box of a gate: checked exactly
-    std::uint64_t bound_calls = 0;     ///< evaluations of `lower_bound`, `upper_bound`
+    /// Evaluations of `lower_bound` and `upper_bound`, and enclosures of guards along intervals.
+    std::uint64_t bound_calls = 0;
     std::uint64_t rollbacks = 0;       ///< returns to the start of a step that could not be closed
     std::uint64_t repeated_steps = 0;  ///< steps taken again because of that
     std::uint64_t events = 0;

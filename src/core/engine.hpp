@@ -353,6 +353,7 @@ protected:
     /// Counts divided steps as `count_refined` does, for a step that holds no event.
     void count_covered() noexcept
     {
+        run_.statistics.bound_calls += search_.cover().take_enclosed();
         run_.statistics.refined_steps += search_.cover().refined();
         run_.statistics.unresolved_steps += search_.cover().unresolved();
     }

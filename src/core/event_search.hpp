@@ -103,6 +103,18 @@ public:
         return cover_.first_event(step, bank, guard, bank[i].side, from, from, to);
     }
 
+    /// What enclosures of guard i tell of the current step. @param interval  [s] length of the
+    /// first part that is tried; 0: the whole step
+    [[nodiscard]] Covered cover_by_tubes(const CurrentStep& step, const Bank& bank, std::size_t i,
+                                         double interval, Statistics& counts)
+    {
+        constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+        const auto guard = bank.view(i, step.mode(), counts.guard_calls);
+        const GuardSample from{.s = 0, .value = unknown}, to{.s = step.h(), .value = unknown};
+        cover_.try_first(interval);
+        return cover_.first_event(step, bank, guard, bank[i].side, from, from, to);
+    }
+
     /// Whether the bounds of guard i, which ends the step on its side, show an event inside.
     [[nodiscard]] bool bounds_show_event(const CurrentStep& step, const Bank& bank, std::size_t i,
                                          std::uint64_t& calls)

@@ -66,6 +66,7 @@ inline void Loop<X, single>::remember_step(double proposed, std::uint64_t reject
     tentative.samples = next_sample_;
     tentative.pieces = run_.solution.size();
     tentative.rejected = rejected;
+    if (planner_->encloses()) describe_polynomial(step_, tentative);
 }
 
 template <class X, bool single>

@@ -18,6 +18,7 @@
 #include <optional>
 #include <span>
 
+#include "core/enclosed_intervals.hpp"
 #include "core/event_search.hpp"
 #include "core/guard_bank.hpp"
 #include "core/metering.hpp"
@@ -45,13 +46,14 @@ struct LastCheck {
     std::size_t first = 0;  ///< index of the first tentative step beyond `sure`
     double later_time = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of another check
     double later_value = 0;
+    double interval = 0;  ///< [s] length of the next interval on which the guard is enclosed
 
     template <class Visit>
     void visit(Visit&& visit)
     {
         for (double* number :
              {&time, &value, &rate, &bound.distance, &bound.speed, &bound.acceleration, &sure,
-              &hoped, &slope, &later_time, &later_value}) {
+              &hoped, &slope, &later_time, &later_value, &interval}) {
             visit(*number);
         }
         visit(exact);
@@ -80,6 +82,7 @@ public:
           gated_(!bounded_ && detector_->horizon),
           meter_(detector_->metering, guards),
           backward_(backward),
+          enclosures_(system, finders.detector, finders.detecting),
           steps_(detector_->longest, like),
           checks_(guards),
           deadlines_(guards),
@@ -91,6 +94,8 @@ public:
 
     [[nodiscard]] Steps& steps() noexcept { return steps_; }
     [[nodiscard]] bool in_interval() const noexcept { return steps_.size() > 0; }
+    /// Whether intervals are closed by enclosures of the guards.
+    [[nodiscard]] bool encloses() const noexcept { return detector_->along; }
 
     /// Whether no guard needs a check until the time `end`.
     [[nodiscard]] bool covers(double end) const noexcept { return end <= limit_; }
@@ -113,7 +118,9 @@ public:
         const double now = clock(step.time(0));
         for (std::size_t i = 0; i < bank.size(); ++i) {
             if (!bank[i].enabled) continue;
+            const double interval = checks_[i].interval;
             checks_[i] = {};
+            checks_[i].interval = interval;
             checks_[i].time = now;
             checks_[i].slope = sign_of(bank[i].side) * bank.rate0(i);
             rest_from(i,
@@ -124,6 +131,8 @@ public:
                        .exact = true},
                       step.mode(), bank);
             checks_[i].rate = bank.rate0(i);
+            // No range on an interval that starts at the surface excludes it.
+            if (encloses() && bank.starts_at_event(i, step)) checks_[i].verify = true;
             schedule(i);
             bank.put_to_sleep(i);
         }
@@ -156,8 +165,9 @@ public:
         const std::size_t last = steps_.size() - 1;
         std::size_t doubt = none;
         for (const std::size_t i : pending_) {
-            checks_[i].verify = false;
-            const std::size_t failed = close_one(i, step, bank, counts, h_next);
+            const bool in_doubt = std::exchange(checks_[i].verify, false);
+            const std::size_t failed = encloses() ? enclose_one(i, in_doubt, step, bank, counts)
+                                                  : close_one(i, step, bank, counts, h_next);
             checks_[i].first = failed;
             doubt = std::min(doubt, failed);
         }
@@ -428,7 +438,7 @@ private:
         if (check.unclear) check.verify = true;
         // Rounding may leave an interval open that would otherwise just close.
         const double hoped = (1 - 1e-12) * detector_->hoped(self_, at.bound, check.slope, reach);
-        const double ahead = std::max(hoped, cleared);
+        const double ahead = std::max({hoped, cleared, encloses() ? check.interval : 0});
         check.hoped =
             std::max(check.sure, at.time + (expects_level(check, bank[i].side) ? 0 : ahead));
     }
@@ -558,6 +568,32 @@ private:
     [[nodiscard]] std::size_t close_one(std::size_t i, const Step<X>& step, Bank& bank,
                                         Statistics& counts, double h_next);
 
+    /// Encloses guard i on the interval, in as few parts as it takes; returns the first step
+    /// that is not proved, or `none`. @param in_doubt  its step is known not to be
+    [[nodiscard]] std::size_t enclose_one(std::size_t i, bool in_doubt, const Step<X>& step,
+                                          Bank& bank, Statistics& counts);
+
+    /// Whether the range of a guard, times the sign of its side, is clear of the surface, also of a
+    /// tie with the end of a step.
+    [[nodiscard]] static bool is_clear(const Bank& bank, std::size_t i, const Enclosure& range,
+                                       bool may_tie) noexcept
+    {
+        const double size = std::fabs(range.centre) + std::fabs(range.slope) + range.radius;
+        const double rounding = may_tie ? tolerances::by_rounding * size : 0;
+        return range.lower() > std::max(bank.touch_of(i, 2 * size), rounding);
+    }
+
+    /// Defers guard i from a time up to which it is proved to be clear.
+    void defer_enclosed(std::size_t i, double time, double interval)
+    {
+        LastCheck& check = checks_[i];
+        check.time = check.sure = time;
+        check.exact = false;
+        check.rate = check.later_time = std::numeric_limits<double>::quiet_NaN();
+        check.interval = interval;
+        check.hoped = time + interval;
+    }
+
     /// A guard that is to be shown clear up to the end of the current step.
     struct Closing {
         std::size_t i;
@@ -601,6 +637,7 @@ private:
     bool gated_;    ///< defers only by what a gate clears
     MeterOfRun meter_;
     bool backward_;
+    Enclosures<X> enclosures_;
     Steps steps_;
     GuardList<LastCheck, single> checks_;
     GuardList<Deadline, single> deadlines_;

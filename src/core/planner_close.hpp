@@ -71,6 +71,47 @@ inline std::size_t Planner<X, single>::narrow(const Closing& on, Check& from, st
 }
 
 template <class X, bool single>
+inline std::size_t Planner<X, single>::enclose_one(std::size_t i, bool in_doubt,
+                                                   const Step<X>& step, Bank& bank,
+                                                   Statistics& counts)
+{
+    LastCheck& known = checks_[i];
+    const std::size_t last = steps_.size();
+    std::size_t lo = known.first;
+    std::size_t hi = last;
+    if (in_doubt || never_sleeps(bank[i]) || bank[i].info.boolean) return lo;
+    const double sign = sign_of(bank[i].side);
+    const auto time_of = [&](std::size_t k) { return place(k, step).time; };
+    double from = time_of(lo);
+    while (lo < last) {
+        const double length = time_of(hi) - from;
+        // A single step that is expected not to be proved is divided.
+        if (hi - lo == 1 && known.interval < 0.5 * length && known.interval > 0) break;
+        ++counts.bound_calls;
+        const Enclosure range =
+            enclosures_.of_steps({i, step.mode(), backward_}, sign, step, steps_, lo, hi);
+        if (is_clear(bank, i, range, hi == last && step.is_pinned())) {
+            known.interval = length * intervals::after_clear(range);
+            lo = hi;
+            from += length;
+            hi = last;
+        } else {
+            const double part = intervals::instead_of(range);
+            known.interval = length * part;
+            if (hi - lo == 1) break;
+            const auto fewer = static_cast<std::size_t>(part * static_cast<double>(hi - lo));
+            hi = lo + std::max(fewer, std::size_t{1});
+            continue;
+        }
+        // The rest of the interval is enclosed as far as the last range lets expect.
+        while (hi - lo > 1 && time_of(hi) - from > 1.5 * known.interval)
+            hi = lo + (hi - lo + 1) / 2;
+    }
+    if (lo > known.first) defer_enclosed(i, time_of(lo), known.interval);
+    return lo < last ? lo : none;
+}
+
+template <class X, bool single>
 inline void Planner<X, single>::close_inside(const Step<X>& step, Bank& bank,
                                              EventSearch<X, single>& search, Statistics& counts)
 {
@@ -81,6 +122,22 @@ inline void Planner<X, single>::close_inside(const Step<X>& step, Bank& bank,
         bank.note_dip(i, false);
         ++kept;
         if (never_sleeps(bank[i]) || !search.cover().covers(bank[i])) continue;
+        if (encloses()) {
+            if (bank.starts_at_event(i, step)) continue;
+            const double end = clock(step.time(step.h()));
+            const double interval = checks_[i].interval;
+            const Covered covered = search.cover_by_tubes(step, bank, i, interval, counts);
+            if (covered.proved) {
+                checks_[i].verify = false;
+                defer_enclosed(i, end, search.cover().next_interval());
+                schedule(i);
+                --kept;
+            } else {
+                checks_[i].interval = search.cover().next_interval();
+                bank.note_dip(i, covered.leaves);
+            }
+            continue;
+        }
         const Check start = check_of(step.time(0), step.x0());
         Check end = check_of(step.time(step.h()), step.x1());
         const double value = value_at(i, start, step.mode(), bank, counts);

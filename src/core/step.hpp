@@ -430,6 +430,18 @@ public:
         for_components([&](auto i) { dxdt[i] = rate[i]; });
     }
 
+    /// Whether the step is a polynomial whose coefficients are known: not that of a host, nor of a
+    /// stepper with an interpolant of its own.
+    [[nodiscard]] bool has_known_polynomial() const noexcept
+    {
+        return !state_.host && (kernel_->series || kernel_->is_dopri5 || !kernel_->interpolates());
+    }
+    /// Whether this is the cubic through both ends.
+    [[nodiscard]] bool is_cubic() const noexcept
+    {
+        return !kernel_->series && dense_nodes() == DenseNodes::end;
+    }
+
     /// Whether the method has an interpolant of its own.
     [[nodiscard]] bool interpolates() const noexcept
     {

@@ -15,7 +15,9 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <utility>
 
+#include "core/enclosed_intervals.hpp"
 #include "core/event_hit.hpp"
 #include "core/guard_bank.hpp"
 #include "core/step.hpp"
@@ -47,7 +49,9 @@ public:
           detector_(&finders.detector),
           self_(finders.detecting),
           resolution_(resolution),
-          in_use_(defers(finders.detector, *system.operator->()) && finders.detector.needs_bounds)
+          enclosures_(system, finders.detector, finders.detecting),
+          in_use_(defers(finders.detector, *system.operator->()) &&
+                  (finders.detector.needs_bounds || finders.detector.along))
     {
     }
 
@@ -64,10 +68,20 @@ public:
     void begin() noexcept
     {
         last_.reset();
+        is_described_ = false;
         refined_ = unresolved_ = false;
     }
     [[nodiscard]] bool refined() const noexcept { return refined_; }
     [[nodiscard]] bool unresolved() const noexcept { return unresolved_; }
+
+    // --- guards that are enclosed ---
+
+    /// Starts the next division by enclosures with a part of this length [s]; 0: of the whole step.
+    void try_first(double interval) noexcept { first_interval_ = next_interval_ = interval; }
+    /// Length [s] that the next interval may have.
+    [[nodiscard]] double next_interval() const noexcept { return next_interval_; }
+    /// Number of enclosures since it was last asked for.
+    [[nodiscard]] std::uint64_t take_enclosed() noexcept { return std::exchange(enclosed_, 0); }
 
     /// The first event of a guard between `start`, where it is on `side`, and `end`, as far as its
     /// bounds tell. `inside`: a further value, if it lies between them.
@@ -76,6 +90,13 @@ public:
                                       const GuardSample& inside, const GuardSample& end);
 
 private:
+    /// Enclosures of a guard in an interval. Each that closes a part takes some before it that do
+    /// not, and beside the surface parts shrink to the finest.
+    static constexpr std::size_t most_enclosures = 256;
+    /// Part of an interval before its end in which a crossing is left to the locator.
+    static constexpr double last_part = 0.25;
+    /// Shortest part of a step that is enclosed: the resolution of a location is not far below it.
+    static constexpr double finest_enclosed = 0x1p-30;
     static constexpr std::size_t most = 4096;          ///< evaluations of a guard in an interval
     static constexpr std::size_t few = 8;              ///< evaluations that tell how many it takes
     static constexpr double most_of_it = 1 - 0x1p-10;  ///< so that rounding leaves it closed
@@ -165,6 +186,11 @@ private:
     /// Divides every part that is still open. False: there is none.
     [[nodiscard]] bool divide_parts(const Task& task, std::size_t& evaluated, double& need);
 
+    /// Encloses the guard on the polynomial from `start` on, up to the first value beyond the
+    /// surface, which is returned.
+    [[nodiscard]] std::optional<GuardSample> enclose(const Task& task, const GuardSample& start,
+                                                     GuardSample end);
+
     /// Where the part between two nodes is divided; NaN: it is closed, or is left as it is.
     /// @param need  increased by the number of evaluations that the part is expected to take
     [[nodiscard]] double place(const Task& task, const Node& lo, const Node& hi, double& need);
@@ -177,7 +203,14 @@ private:
     const DetectorTable<X>* detector_;
     const void* self_;
     EventResolution resolution_;
+    Enclosures<X> enclosures_;
     bool in_use_;
+    TentativeStep<X> shape_{};  ///< of the current step's polynomial, once `is_described_`
+    bool is_described_ = false;
+    double first_interval_ = 0;  ///< [s]
+    double next_interval_ = 0;   ///< [s]
+    double clear_until_ = 0;     ///< [s] offset up to which the guard is clear
+    std::uint64_t enclosed_ = 0;
     X x_{};
     boost::container::small_vector<Node, 48> nodes_, next_;
     CubicCheck cubic_{0, 0, 0, 0, 0};  ///< through the ends of the interval
@@ -202,14 +235,15 @@ inline Covered StepCover<X, single>::first_event(const Step<X>& step, const Bank
     found_ = {};
     if (start.s == 0 && bank.starts_at_event(guard.which(), step)) start.value = 0;
     while (start.s < end.s) {
+        const Task task{step, bank, guard, side};
         const std::optional<GuardSample> beyond =
-            divide({step, bank, guard, side}, start, inside, end);
+            detector_->along ? enclose(task, start, end) : divide(task, start, inside, end);
         if (!beyond) break;
         found_.proved = false;
         if (counts(side, guard.crossing())) {
             found_.leaves = true;
             found_.side = side;
-            found_.lo = nodes_[nodes_.size() - 2].s;
+            found_.lo = detector_->along ? clear_until_ : nodes_[nodes_.size() - 2].s;
             found_.hi = beyond->s;
             break;
         }
@@ -245,6 +279,107 @@ inline auto StepCover<X, single>::divide(const Task& task, const GuardSample& st
     const Node& last = nodes_.back();
     if (!is_beyond(task, last)) return std::nullopt;
     return GuardSample{.s = last.s, .value = sign_of(task.side) * last.bound.distance};
+}
+
+template <class X, bool single>
+inline auto StepCover<X, single>::enclose(const Task& task, const GuardSample& start,
+                                          GuardSample end) -> std::optional<GuardSample>
+{
+    const Step<X>& step = task.step;
+    if (!is_described_) describe_polynomial(step, shape_);
+    is_described_ = true;
+    if (!shape_.is_known) {
+        found_.proved = false;
+        return std::nullopt;
+    }
+    const X* const beyond = shape_.is_cubic ? nullptr : &shape_.beyond;
+    const double sign = sign_of(task.side);
+    const double finest = finest_enclosed * step.h();
+    double open = finest;  // parts that cannot be cleared may be as long as those just before
+    const std::size_t i = task.guard.which();
+    const auto value_at = [&](double s) {
+        refined_ = true;
+        return task.guard.value(step.time(s), state_at(step, s));
+    };
+    const auto touch_of = [&](double size) { return task.bank.touch_of(i, 2 * size); };
+    const auto is_across = [&](double value) { return sign * value < -touch_of(std::fabs(value)); };
+    const double whole = end.s - start.s;
+    double s = start.s;
+    double width = first_interval_ > 0 ? std::min(first_interval_, whole) : whole;
+    bool has_failed = first_interval_ > 0;
+    first_interval_ = 0;
+    // Ends the search where the interval is known to leave, and what is left of it is short. A
+    // place at which the guard is expected to be beyond makes it shorter.
+    const auto is_bracketed = [&](double probe) {
+        if (!(end.value == end.value)) end.value = value_at(end.s);
+        if (sign * end.value > touch_of(std::fabs(end.value))) return false;
+        if (probe < end.s && end.s - s > last_part * whole) {
+            const double value = value_at(probe);
+            if (is_across(value)) end = {.s = probe, .value = value};
+        }
+        return end.s - s <= last_part * whole;
+    };
+    const auto bracket = [&]() -> std::optional<GuardSample> {
+        found_.proved = false;
+        clear_until_ = s;
+        if (is_across(end.value)) return end;
+        return std::nullopt;
+    };
+    const bool is_sampled = start.value == start.value;
+    for (std::size_t tried = 0; s < end.s; ++tried) {
+        if (tried == most_enclosures) {
+            found_.proved = false;
+            found_.unresolved = true;
+            break;
+        }
+        const double rest = end.s - s;
+        width = std::min(std::max(width, open), rest);
+        if (!has_failed && width > 0.75 * rest) width = rest;
+        const double to = width < rest ? s + width : end.s;
+        const Enclosure range =
+            enclosures_.of_part({i, task.guard.mode(), step.backward()}, sign, step, beyond, s, to);
+        ++enclosed_;
+        const double size = std::fabs(range.centre) + std::fabs(range.slope) + range.radius;
+        const double tie = to == step.h() && step.is_pinned() ? tolerances::by_rounding * size : 0;
+        if (range.lower() > std::max(touch_of(size), tie)) {
+            s = to;
+            const double part = intervals::after_clear(range);
+            width *= part;
+            next_interval_ = width;
+            open = finest;
+            has_failed = false;
+            if (part < 0.5 && s < end.s && is_bracketed(s + 2 * width)) return bracket();
+            continue;
+        }
+        has_failed = true;
+        if (s == start.s && is_sampled && std::fabs(start.value) <= touch_of(size)) {
+            // No range excludes the root at the start.
+            found_.proved = false;
+            width = std::min(finest_part * step.h(), rest);
+            s = width < rest ? s + width : end.s;
+            continue;
+        }
+        if (is_bracketed(to)) return bracket();
+        if (width > open) {
+            const bool is_known = std::isfinite(range.radius);
+            if (is_known || width > step.h() / 64) {
+                width *= is_known ? intervals::instead_of(range) : 0.25;
+                next_interval_ = width;
+                continue;
+            }
+        }
+        found_.proved = false;
+        if (!std::isfinite(range.radius)) {  // a comparison that is decided nowhere near
+            found_.unresolved = true;
+            break;
+        }
+        clear_until_ = s;
+        const double value = to < end.s ? value_at(to) : end.value;
+        if (is_across(value)) return GuardSample{.s = to, .value = value};
+        s = to;
+        open *= 2;
+    }
+    return std::nullopt;
 }
 
 template <class X, bool single>

@@ -18,6 +18,9 @@ struct TentativeStep {
     std::size_t samples = 0;
     std::size_t pieces = 0;
     std::uint64_t rejected = 0;
+    X beyond{};             ///< what its polynomial may differ from its cubic by
+    bool is_cubic = false;  ///< by nothing
+    bool is_known = false;  ///< it has a polynomial
 };
 
 /// An interval of tentative steps, in memory that is allocated once.
@@ -27,7 +30,7 @@ public:
     TentativeSteps(std::size_t most, const X& like) : steps_(most)
     {
         for (TentativeStep<X>& step : steps_) {
-            step.start.x = step.start.remainder = step.start.rate = like;
+            step.start.x = step.start.remainder = step.start.rate = step.beyond = like;
         }
     }
 

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "ricochet/detail/motion_tube.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/finding.hpp"
 #include "ricochet/planned.hpp"
@@ -63,6 +64,8 @@ struct DetectorTable {
     GateAnswer (*horizon)(Self, void* door, Mode mode, double t, const X& x) = nullptr;
     GateAnswer (*level)(Self, void* door, GuardInMode, double t, const X& x) = nullptr;
     double lowest_level = 0;
+    /// A guard on a tube around the motion. Null: its events are excluded by values.
+    Enclosure (*along)(Self, void* door, const GuardInMode&, const MotionTube<X>& tube) = nullptr;
     const MeterOptions* metering = nullptr;
 };
 

@@ -64,6 +64,13 @@ class DetectorTableOf {
         };
         table.closes = [](Self d, const GuardBound& from, const GuardBound& to, double tau,
                           double band) { return self(d).closes(from, to, tau, band); };
+        if constexpr (requires(const System& s, const GuardInMode& of, const MotionTube<C>& tube) {
+                          Detector::template along<X>(s, of, tube);
+                      }) {
+            table.along = [](Self, void* door, const GuardInMode& of, const MotionTube<C>& tube) {
+                return Detector::template along<X>(at(door).system(), of, tube);
+            };
+        }
         if constexpr (requires(const System& s, const X& x) {
                           detector.horizon(s, Mode{}, 0.0, x);
                       }) {

@@ -22,6 +22,11 @@ void throw_no_steps_between_checks()
     throw std::invalid_argument("EveryK: steps must be at least 1, got 0");
 }
 
+void throw_no_steps_in_interval()
+{
+    throw std::invalid_argument("Enclosed: longest_interval must be at least 1 step, got 0");
+}
+
 void throw_bad_slope_skip(double fraction, std::size_t longest)
 {
     throw std::invalid_argument(fmt::format(

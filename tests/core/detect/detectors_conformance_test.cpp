@@ -2,6 +2,7 @@
 #include "conformance/detectors.hpp"
 
 #include "ricochet/bernstein.hpp"
+#include "ricochet/enclosed.hpp"
 #include "ricochet/extremum.hpp"
 #include "ricochet/gates.hpp"
 
@@ -36,6 +37,7 @@ std::vector<DetectorCase> all()
     // the guard is zero it is evaluated at up to four other places.
     return {with("Ends", Ends{}, Evidence::assumed, 5),
             with("Extremum", Extremum{}, Evidence::checked, 61),
+            with("Enclosed", Enclosed{}, Evidence::checked, 61),
             with("Bernstein", Bernstein{}, Evidence::checked, 100'000),
             // The choice of steps that it clears is tested elsewhere; this tests the other steps.
             with("Network", network(), Evidence::assumed, 6),
