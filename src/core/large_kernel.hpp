@@ -30,7 +30,8 @@ class LargeKernel {
     using Method = RungeKutta<Tableau, X>;
     static constexpr std::size_t last = Method::kept_stages;  ///< the stage that is kept
 
-    /// Four doubles, in one register or in two, by the instruction set.
+    /// Four doubles, in one register or in two, by the instruction set. A function that returns
+    /// them does so in another place where it is compiled for AVX2: each has to be inlined.
     typedef double Four __attribute__((vector_size(32)));
 
     /// Writes dx/ds at offset s and state `step.at` into `rate`.
@@ -207,7 +208,8 @@ class LargeKernel {
         [[nodiscard, gnu::always_inline]] V ratio_of(std::size_t i, const V& start, const V& end,
                                                      const V& departing) const
         {
-            const auto rates = [&](auto j) {
+            const auto rates = [&](auto j) __attribute__((always_inline))
+            {
                 if constexpr (j <= last) {
                     return load<V>(k[j - 1] + i);
                 } else {

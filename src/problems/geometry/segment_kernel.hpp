@@ -56,7 +56,11 @@ using LeastBlockFunction = LeastBlock (*)(const SegmentColumns& columns, double 
 [[gnu::always_inline]] inline LeastBlock least_block(const SegmentColumns& columns, double px,
                                                      double py, double above) noexcept
 {
-    const auto load = [](const double* from) { return *reinterpret_cast<const Lanes*>(from); };
+    // Not inlined, this would be one function for the files of all instruction sets.
+    const auto load = [](const double* from) __attribute__((always_inline))
+    {
+        return *reinterpret_cast<const Lanes*>(from);
+    };
     LeastBlock best{above, 0};
     for (std::size_t i = 0; i < columns.count; i += segments_per_block) {
         Lanes least = Lanes{} + best.squared;
