@@ -7,25 +7,32 @@ state. ``System`` is for modes and many guards, ``integrate`` and ``Simulation``
 floating-point numbers.
 """
 
+from importlib import import_module
+
 from . import _show  # noqa: F401
-from ._compiled import C_FLOW, C_GUARD, C_JACOBIAN, C_RATE, C_RESET, Compiled
-from ._ensemble import Ensemble, ensemble, row_seed
-from ._filippov import Filippov
-from ._fmu import Fmu, FmuRun, load_fmu
-from ._gradient import (Adjoint, Gradient, Perceptron, adjoint, find_periodic_orbit, gradient,
-                        monodromy, sensitivities)
-from ._inclusion import Inclusion
 from ._ivp import solve_ivp
-from ._monitor import Cut, Monitor, Verdict
-from ._network import Network
-from ._plot import plot
 from ._ready import SYSTEMS as _READY
 from ._ricochet import Run, Snapshot, Solution, Times, __version__
 from ._run import Kind, Simulation, integrate
-from ._scene import Scene, SceneKind, SceneRun
-from ._solution import OdeResult
 from ._system import Guard, Stop, System, every, guard
-from ._training import Certified, Trained, certify, train_classifier, train_gate
+
+# What many programs do not use is imported when it is first asked for.
+_LATER = {
+    "_compiled": ("C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Compiled"),
+    "_ensemble": ("Ensemble", "ensemble", "row_seed"),
+    "_filippov": ("Filippov",),
+    "_fmu": ("Fmu", "FmuRun", "load_fmu"),
+    "_gradient": ("Adjoint", "Gradient", "Perceptron", "adjoint", "find_periodic_orbit", "gradient",
+                  "monodromy", "sensitivities"),
+    "_inclusion": ("Inclusion",),
+    "_monitor": ("Cut", "Monitor", "Verdict"),
+    "_network": ("Network",),
+    "_plot": ("plot",),
+    "_scene": ("Scene", "SceneKind", "SceneRun"),
+    "_solution": ("OdeResult",),
+    "_training": ("Certified", "Trained", "certify", "train_classifier", "train_gate"),
+}
+_HOME = {name: module for module, names in _LATER.items() for name in names}
 
 globals().update(_READY)  # BouncingBall and the other ready systems
 
@@ -38,3 +45,15 @@ __all__ = [
     "monodromy", "plot", "row_seed", "sensitivities", "solve_ivp", "train_classifier", "train_gate",
     *_READY,
 ]
+
+
+def __getattr__(name):
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOME[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__():
+    return sorted({*globals(), *__all__})

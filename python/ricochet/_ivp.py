@@ -1,7 +1,6 @@
 """Initial value problems with SciPy's arguments and SciPy's result."""
 
 from contextlib import nullcontext
-from difflib import get_close_matches
 from warnings import warn
 
 import numpy as np
@@ -278,6 +277,8 @@ def _refuse_near_names(event, who):
     for found in getattr(event, "__dict__", ()):
         if found in known or found.startswith("_"):
             continue
+        from difflib import get_close_matches
+
         meant = get_close_matches(found.lower(), known, 1, 0.8)
         if meant:
             raise ValueError(f"{who}: found an attribute {found!r}, expected {meant[0]!r}")

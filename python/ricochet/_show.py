@@ -1,9 +1,5 @@
 """How runs are shown: a line at the prompt, a table and a picture in a notebook."""
 
-import base64
-import html
-import io
-
 import numpy as np
 
 from . import _ricochet
@@ -34,6 +30,8 @@ def _guard_of(run, number):
 
 def _table(run):
     """The events as a table, the first and the last of many."""
+    from html import escape
+
     from ._run import Kind
 
     events, modes = run.events, run.event_modes
@@ -54,7 +52,7 @@ def _table(run):
             before, after = (str(getattr(mode, "name", mode)) for mode in modes[i])
             cells.append(before if before == after else f"{before} \u2192 {after}")
         cells += [_numbers(event["before"]), _numbers(event["after"])]
-        rows.append("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in cells) + "</tr>")
+        rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
     titles = "".join(f"<th>{title}</th>" for title in head)
     return f"<table><thead><tr>{titles}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 
@@ -67,6 +65,9 @@ def _picture(run):
         from matplotlib.figure import Figure
     except ImportError:
         return ""
+    import base64
+    import io
+
     from ._plot import plot
 
     # A figure of its own: pyplot and its current axes are left alone.
@@ -80,9 +81,11 @@ def _picture(run):
 
 def _page(run):
     """A run as HTML: its outcome, its events, and its states over time where it has them."""
-    parts = [f"<p><code>{html.escape(_line(run))}</code></p>"]
+    from html import escape
+
+    parts = [f"<p><code>{escape(_line(run))}</code></p>"]
     if not run.success:
-        parts.append(f"<p>{html.escape(run.message)}</p>")
+        parts.append(f"<p>{escape(run.message)}</p>")
     parts.append(_picture(run))
     if len(run.events):
         parts.append(_table(run))

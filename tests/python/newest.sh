@@ -25,5 +25,5 @@ done
 cd "$source/tests/python"
 PYTHONPATH=$room/build/python RICOCHET_SOURCE=$source MPLBACKEND=Agg PYTHONDONTWRITEBYTECODE=1 \
     "$venv" run.py compiled_test.py ensemble_test.py own_ensemble_test.py event_systems_test.py filippov_test.py \
-    formula_test.py held_test.py hybrid_test.py implicit_test.py instants_test.py meaning_test.py monitor_test.py network_test.py notebooks_test.py refusals_test.py \
+    formula_test.py held_test.py hybrid_test.py import_test.py implicit_test.py instants_test.py meaning_test.py monitor_test.py network_test.py notebooks_test.py refusals_test.py \
     rest_test.py scene_test.py scipy_test.py scipy_own_test.py show_test.py set_valued_test.py times_test.py types_test.py veto_test.py docs_test.py
