@@ -1,0 +1,1 @@
+// The headers that the test programs share, precompiled; see CMakeLists.txt.
