@@ -30,6 +30,8 @@ Json json(const Parameter& parameter)
               {"upper_included", range.upper_included}}}};
 }
 
+std::string known_solution(const SystemEntry& system);
+
 Json json(const SystemEntry& system)
 {
     Json parameters = Json::array();
@@ -41,12 +43,13 @@ Json json(const SystemEntry& system)
     }
     Json guards = Json::array();
     for (const GuardLabel& guard : system.guards) guards.push_back(guard.name);
+    const std::string known = known_solution(system);
     return {{"name", system.name},       {"description", system.description},
             {"source", system.source},   {"equations", system.equations},
             {"parameters", parameters},  {"state", state},
             {"guards", guards},          {"modes", system.modes},
             {"t_start", system.t_start}, {"t_end", system.t_end},
-            {"taylor", system.series}};
+            {"taylor", system.series},   {"known_solution", known.empty() ? Json() : Json(known)}};
 }
 
 std::string text(const SystemEntry& system)

@@ -160,7 +160,12 @@ TEST_F(App, CompareFindsEveryEventOfTheSystemsWithGuards)
 {
     // The errors are those of dopri5 at 1e-8 and of rk4 in the steps of the comparison:
     // 3e-5 of the orbit that passes near the Moon is the largest measured.
+    const nlohmann::json systems = json({"systems", "--json"});
     for (const std::string& name : with_guards) {
+        const auto system = std::find_if(systems.begin(), systems.end(),
+                                         [&](const auto& each) { return each["name"] == name; });
+        ASSERT_NE(system, systems.end()) << name;
+        if ((*system)["known_solution"].is_null()) continue;
         const Result result = run({"compare", name, "--json"});
         // On a slow machine a message may say that the program is still running.
         ASSERT_TRUE(result.err.empty() || result.err.starts_with("ricochet: still running"))

@@ -1,4 +1,6 @@
 // Options as a C program gives them.
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -9,6 +11,33 @@
 namespace ricochet::c {
 
 namespace {
+
+/// The methods of C, but for RC_TAYLOR, which C does not run.
+struct Method {
+    rc_method value;
+    MethodName name;
+    const char* spelled;
+};
+constexpr std::array<Method, 5> methods{{
+    {RC_DOPRI5, MethodName::dopri5, "RC_DOPRI5"},
+    {RC_FEHLBERG78, MethodName::fehlberg78, "RC_FEHLBERG78"},
+    {RC_CASH_KARP54, MethodName::cash_karp54, "RC_CASH_KARP54"},
+    {RC_RK4, MethodName::rk4, "RC_RK4"},
+    {RC_EULER, MethodName::euler, "RC_EULER"},
+}};
+static_assert(methods.size() == detail::named_methods.size());
+
+/// "RC_DOPRI5, RC_FEHLBERG78 or ...": those with an error estimate, or without one.
+[[nodiscard]] std::string spelled_methods(bool estimates)
+{
+    std::string out, last;
+    for (const Method& each : methods) {
+        if (estimates_error(each.name) != estimates) continue;
+        if (!last.empty()) out += out.empty() ? last : ", " + last;
+        last = each.spelled;
+    }
+    return out + " or " + last;
+}
 
 template <class T>
 [[nodiscard]] T defaults() noexcept;
@@ -98,6 +127,16 @@ public:
         refuse(std::string(name) + ": there is no rc_" + name + " " + std::to_string(value));
     }
 
+    /// @throws Refusal unless the value is a method, or RC_TAYLOR
+    [[nodiscard]] rc_method method(std::int32_t value) const
+    {
+        const auto is_value = [&](const Method& each) { return each.value == value; };
+        if (value == RC_TAYLOR || std::any_of(methods.begin(), methods.end(), is_value)) {
+            return static_cast<rc_method>(value);
+        }
+        refuse("method: there is no rc_method " + std::to_string(value));
+    }
+
     template <class T>
     [[nodiscard]] FinderOptions finders(const T& from) const
     {
@@ -134,7 +173,7 @@ RunOptions read_options(const rc_options* given)
     const Reader reader("rc_options");
     const auto from = read_struct<rc_options>(given, "rc_options", defaults<rc_options>());
     RunOptions run;
-    run.method = reader.one_of("method", from.method, RC_TAYLOR);
+    run.method = reader.method(from.method);
     if (run.method == RC_TAYLOR) {
         reader.refuse(
             "method: found RC_TAYLOR, whose power series need the flow as a formula, for "
@@ -143,9 +182,9 @@ RunOptions read_options(const rc_options* given)
     }
     run.fixed_step = reader.flag("fixed_step", from.fixed_step);
     if (!run.fixed_step && !estimates_error(method_of(run.method))) {
-        reader.refuse(
-            "method: found RC_RK4 or RC_EULER, which have no error estimate; expected fixed_step = "
-            "1 and a step, or RC_DOPRI5, RC_FEHLBERG78 or RC_CASH_KARP54");
+        reader.refuse("method: found " + spelled_methods(false) +
+                      ", which have no error estimate; expected fixed_step = 1 and a step, or " +
+                      spelled_methods(true));
     }
     run.finders = reader.finders(from);
     if (from.sample_count > 0 && !from.sample_times) {
@@ -192,13 +231,8 @@ void require_options_of_phases(const RunOptions& options)
 
 MethodName method_of(rc_method method) noexcept
 {
-    switch (method) {
-        case RC_FEHLBERG78: return MethodName::fehlberg78;
-        case RC_CASH_KARP54: return MethodName::cash_karp54;
-        case RC_RK4: return MethodName::rk4;
-        case RC_EULER: return MethodName::euler;
-        case RC_DOPRI5:
-        case RC_TAYLOR: break;  // the latter is refused
+    for (const Method& each : methods) {
+        if (each.value == method) return each.name;
     }
     return MethodName::dopri5;
 }

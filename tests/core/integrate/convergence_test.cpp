@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <optional>
 
 #include "ricochet/extremum.hpp"
@@ -39,6 +41,52 @@ double observed_order(double h)
 {
     return std::log2(largest_error<Method>(h) / largest_error<Method>(h / 4)) / 2;
 }
+
+/// Residuals of the order conditions up to order 3 of weights w: sum w - 1, w.c - 1/2, w.c^2 - 1/3,
+/// w.A c - 1/6; those of error weights are of zero on the right (J. C. Butcher, Numerical Methods
+/// for Ordinary Differential Equations, 2016, section 31).
+template <class Tableau, std::size_t count>
+constexpr std::array<double, 4> conditions(const std::array<double, count>& w, double right)
+{
+    std::array<double, 4> sums{-right, -right / 2, -right / 3, -right / 6};
+    for (std::size_t i = 0; i < count; ++i) {
+        const bool at_end = i == Tableau::stages;  // first same as last
+        const double c = at_end ? 1 : Tableau::c[i];
+        double inner = 0;
+        for (std::size_t j = 0; j < Tableau::stages; ++j) {
+            inner += (at_end ? Tableau::b[j] : Tableau::a[i][j]) * Tableau::c[j];
+        }
+        sums[0] += w[i];
+        sums[1] += w[i] * c;
+        sums[2] += w[i] * c * c;
+        sums[3] += w[i] * inner;
+    }
+    return sums;
+}
+
+/// Whether the weights, and the error weights up to the order of the estimate, satisfy the
+/// conditions up to order 3, to the rounding of a sum of a dozen terms of up to a dozen.
+template <class Tableau>
+constexpr bool satisfies_conditions()
+{
+    constexpr double rounding = 1e-14;
+    constexpr std::array<int, 4> order{1, 2, 3, 3};
+    const auto hold = [&](const std::array<double, 4>& sums, int up_to) {
+        for (std::size_t k = 0; k < sums.size(); ++k) {
+            const bool zero = sums[k] < rounding && sums[k] > -rounding;
+            if (order[k] <= up_to && !zero) return false;
+        }
+        return true;
+    };
+    bool fine = hold(conditions<Tableau>(Tableau::b, 1), Tableau::order);
+    if constexpr (requires { Tableau::error; }) {
+        fine = fine && hold(conditions<Tableau>(Tableau::error, 0), Tableau::error_order);
+    }
+    return fine;
+}
+static_assert(satisfies_conditions<detail::CashKarp54Tableau>());
+static_assert(satisfies_conditions<detail::Dopri5Tableau>());
+static_assert(satisfies_conditions<detail::Fehlberg78Tableau>());
 
 TEST(Convergence, EulerKeepsOrderOneThroughEvents)
 {
