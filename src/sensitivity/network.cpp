@@ -17,7 +17,6 @@ namespace {
 
 namespace kernel = detail::RICOCHET_KERNEL_NAMESPACE;
 
-constexpr std::size_t width = Mlp<double>::max_width;
 constexpr std::size_t lanes = kernel::lanes<double>;
 
 /// y += a x, in which no sum is reordered.
@@ -100,64 +99,87 @@ DifferentiableMlp DifferentiableMlp::with(std::span<const double> values) const
     return DifferentiableMlp(model);
 }
 
+namespace {
+
+/// Memory of this thread in rows that begin at blocks, each long enough for every layer.
+class Rows {
+public:
+    explicit Rows(const std::vector<DenseLayer>& layers)
+    {
+        constexpr std::size_t block = kernel::block<double>;
+        for (const DenseLayer& layer : layers) {
+            width_ = std::max({width_, layer.inputs, layer.outputs});
+        }
+        width_ = (width_ + block - 1) / block * block;
+        thread_local std::vector<double> memory;
+        const std::size_t size = (layers.size() + 2) * width_ + block;
+        if (memory.size() < size) memory.resize(size);
+        const auto at = reinterpret_cast<std::uintptr_t>(memory.data()) / sizeof(double);
+        first_ = memory.data() + (block - at % block) % block;
+    }
+    [[nodiscard]] double* operator[](std::size_t k) const noexcept { return first_ + k * width_; }
+
+private:
+    std::size_t width_ = 0;
+    double* first_;
+};
+
+/// The outputs of a hidden layer, by columns of weights.
+void evaluate(const DenseLayer& layer, const std::vector<double>& columns, bool relu,
+              const double* x, double* y) noexcept
+{
+    std::copy(layer.bias.begin(), layer.bias.end(), y);
+    for (std::size_t i = 0; i < layer.inputs; ++i) {
+        add_multiple(y, x[i], columns.data() + i * layer.outputs, layer.outputs);
+    }
+    if (relu) {
+        for (std::size_t j = 0; j < layer.outputs; ++j) y[j] = y[j] > 0 ? y[j] : 0;
+    } else {
+        tanh_all(y, layer.outputs);
+    }
+}
+
+/// Adds the products of the weights `back` with the derivatives of a layer.
+void add_products(const DenseLayer& layer, const double* back, const double* x, double* by_x,
+                  double* by_parameters) noexcept
+{
+    for (std::size_t j = 0; j < layer.outputs; ++j) {
+        if (back[j] == 0) continue;
+        add_multiple(by_parameters + j * layer.inputs, back[j], x, layer.inputs);
+        add_multiple(by_x, back[j], layer.weight.data() + j * layer.inputs, layer.inputs);
+    }
+    add_multiple(by_parameters + layer.weight.size(), 1, back, layer.outputs);
+}
+
+}  // namespace
+
 void DifferentiableMlp::vjp(const double* in, const double* weights, double* by_in,
                             double* by_parameters) const noexcept
 {
     const std::vector<DenseLayer>& layers = layers_->model.layers;
     const bool relu = layers_->model.activation == Activation::relu;
-    // The outputs of all hidden layers, one row each, as long as the widest needs.
-    thread_local std::vector<double> memory;
-    std::size_t row = 2 * lanes;
-    for (const DenseLayer& layer : layers)
-        row = std::max(row, layer.outputs + layer.inputs + lanes);
-    row = (row + lanes - 1) / lanes * lanes;
-    const std::size_t alignment = kernel::block_bytes / sizeof(double);
-    row = (row + alignment - 1) / alignment * alignment;
-    if (memory.size() < (layers.size() + 3) * row) memory.resize((layers.size() + 3) * row);
-    double* const first =
-        memory.data() +
-        (alignment - reinterpret_cast<std::uintptr_t>(memory.data()) / sizeof(double) % alignment) %
-            alignment;
-    const auto outputs_of = [&](std::size_t k) { return first + k * row; };
-
-    const double* x = in;
+    const Rows rows(layers);  // the outputs of the hidden layers, then two rows of weights
+    const auto input_of = [&](std::size_t k) { return k == 0 ? in : rows[k - 1]; };
     for (std::size_t k = 0; k + 1 < layers.size(); ++k) {
-        const DenseLayer& layer = layers[k];
-        double* y = outputs_of(k);
-        std::copy(layer.bias.begin(), layer.bias.end(), y);
-        for (std::size_t i = 0; i < layer.inputs; ++i) {
-            add_multiple(y, x[i], layers_->transposed[k].data() + i * layer.outputs, layer.outputs);
-        }
-        if (relu) {
-            for (std::size_t j = 0; j < layer.outputs; ++j) y[j] = y[j] > 0 ? y[j] : 0;
-        } else {
-            tanh_all(y, layer.outputs);
-        }
-        x = y;
+        evaluate(layers[k], layers_->transposed[k], relu, input_of(k), rows[k]);
     }
 
-    double* back = outputs_of(layers.size());
-    double* next = outputs_of(layers.size() + 1);
+    double* back = rows[layers.size()];
+    double* next = rows[layers.size() + 1];
     std::copy_n(weights, layers.back().outputs, back);
     double* by = by_parameters + count_;
-    for (std::size_t k = layers.size(); k-- > 0;) {
+    for (std::size_t k = layers.size(); k-- > 1;) {
         const DenseLayer& layer = layers[k];
         by -= layer.weight.size() + layer.bias.size();
-        const double* from = k == 0 ? in : outputs_of(k - 1);
-        double* to = k == 0 ? by_in : next;
-        if (k > 0) std::fill_n(to, layer.inputs, 0.0);
-        for (std::size_t j = 0; j < layer.outputs; ++j) {
-            if (back[j] == 0) continue;
-            add_multiple(by + j * layer.inputs, back[j], from, layer.inputs);
-            add_multiple(to, back[j], layer.weight.data() + j * layer.inputs, layer.inputs);
-        }
-        add_multiple(by + layer.weight.size(), 1, back, layer.outputs);
-        if (k == 0) return;
+        const double* x = input_of(k);
+        std::fill_n(next, layer.inputs, 0.0);
+        add_products(layer, back, x, next, by);
         for (std::size_t i = 0; i < layer.inputs; ++i) {
-            to[i] *= relu ? (from[i] > 0 ? 1.0 : 0.0) : 1 - from[i] * from[i];
+            next[i] *= relu ? (x[i] > 0 ? 1.0 : 0.0) : 1 - x[i] * x[i];
         }
         std::swap(back, next);
     }
+    add_products(layers.front(), back, in, by_in, by_parameters);
 }
 
 }  // namespace ricochet
