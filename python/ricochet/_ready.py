@@ -131,3 +131,4 @@ def _ready_class(of):
 
 #: The classes of the ready systems by their names.
 SYSTEMS = {of["type"]: _ready_class(of) for of in _ricochet.ready_descriptions()}
+globals().update(SYSTEMS)
