@@ -141,7 +141,8 @@ void read_layers(const Header& header, std::span<const std::byte> data, const Lo
         }
         expect(bias_name, bias, describe({shape[0]}),
                bias.shape.size() == 1 && bias.shape[0] == shape[0]);
-        model.layers.push_back({shape[1], shape[0],
+        model.layers.push_back({static_cast<std::size_t>(shape[1]),
+                                static_cast<std::size_t>(shape[0]),
                                 read_tensor(weight_name, weight, data, options, refuse),
                                 read_tensor(bias_name, bias, data, options, refuse)});
     }

@@ -16,12 +16,13 @@ namespace ricochet::c {
 }
 
 /// The size that the caller's struct claims to have.
-/// @throws Refusal if it is larger than the library's, or cannot belong to any release: fields come
-/// in groups of eight bytes.
+/// @throws Refusal if it is larger than the library's, or cannot belong to any release: structs
+/// consist of whole words, of eight bytes or, on machines with addresses of 32 bits, of four.
 template <class T>
 [[nodiscard]] std::size_t size_of_given(const void* given, const char* name)
 {
     static_assert(std::is_trivially_copyable_v<T> && offsetof(T, size) == 0);
+    static_assert(sizeof(T) % sizeof(std::size_t) == 0);
     if (!given) throw_null(name);
     std::size_t size = 0;
     std::memcpy(&size, given, sizeof size);
@@ -32,7 +33,7 @@ template <class T>
                           std::to_string(sizeof(T)) +
                           " of them: it is older than the program, or `size` has not been set");
     }
-    if (size < 2 * sizeof(std::size_t) || size % 8 != 0) {
+    if (size < 2 * sizeof(std::size_t) || size % sizeof(std::size_t) != 0) {
         throw Refusal(RC_WRONG_SIZE, std::string(name) + ": found a size of " +
                                          std::to_string(size) + " bytes; expected sizeof(" + name +
                                          ") in its field `size`");
