@@ -93,7 +93,9 @@ function describe() {
   const off = run.events.map((event) => Math.abs(event.t - event.exact)).filter((difference) => difference >= 0);
   const worst = off.length ? `; farthest from the closed form ${Math.max(...off).toExponential(1)} s` : "";
   const found = run.total === 1 ? "1 event" : `${run.total} events`;
-  status.textContent = `${found} in ${run.time.toFixed(1)} ms${worst}. How it ended: ${run.message}.`;
+  const last = run.events[run.events.length - 1];
+  const ending = last ? ` Last event: ${system().events[last.label]} at ${last.t.toPrecision(6)} s.` : "";
+  status.textContent = `${found} in ${run.time.toFixed(1)} ms${worst}. How it ended: ${run.message}.${ending}`;
 }
 
 function fillTable() {
@@ -155,7 +157,7 @@ function axes({ draw, width, height }) {
     draw.moveTo(48, y(v));
     draw.lineTo(width - 12, y(v));
     draw.textAlign = "right";
-    draw.fillText(v.toPrecision(3), 44, y(v) + 4);
+    draw.fillText(Math.abs(v) < 1e-9 * (high - low) ? "0" : v.toPrecision(3), 44, y(v) + 4);
     draw.textAlign = part === 1 ? "right" : "center";
     draw.fillText(`${Number((part * end).toPrecision(4))}${part === 1 ? " s" : ""}`, x(part * end) + (part === 1 ? 8 : 0), height - 6);
   }

@@ -11,6 +11,7 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -299,7 +300,12 @@ int play_run(int system, int points)
     results.path.clear();
     results.counts = {};
     try {
-        const Entry& entry = systems.at(static_cast<std::size_t>(system));
+        if (system < 0 || static_cast<std::size_t>(system) >= systems.size()) {
+            throw std::invalid_argument("play_run: system must be 0 to " +
+                                        std::to_string(systems.size() - 1) + ", got " +
+                                        std::to_string(system));
+        }
+        const Entry& entry = systems[static_cast<std::size_t>(system)];
         entry.run(std::span(results.parameters).first(entry.parameters), points);
     } catch (const std::exception& error) {
         results.message = error.what();

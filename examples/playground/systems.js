@@ -215,7 +215,7 @@ const systems = [
   {
     key: "discs",
     title: "Two discs and a wall",
-    text: "A heavy disc drives a light one against a wall, all without loss. For mass ratios of 100 to the power n the number of impacts begins like the digits of π.",
+    text: "A heavy disc drives a light one against a wall, all without loss. For mass ratios of 100 to the power n the number of impacts has the first digits of π.",
     sliders: [
       slider("mass ratio", "", 1, 10000, 100, 1),
       slider("distance", "m", 0.2, 3, 1, 0.1),

@@ -95,7 +95,8 @@ class Forms(unittest.TestCase):
         refused = [message for count, message, _ in native() if count < 0]
         self.assertEqual(len(refused), 3)
         self.assertIn("restitution must lie in [0, 1]", refused[0])
-        self.assertIn("friction", refused[1])
+        self.assertIn("static_friction", refused[1])
+        self.assertIn("system must be 0 to 5, got 9", refused[2])
 
     def test_the_ball_rests_last(self):
         rows = native()[1][2]
@@ -111,16 +112,15 @@ class Module(unittest.TestCase):
         cls.runs = runs_of(done.stdout)
 
     def test_numbers_are_those_of_the_native_library(self):
-        # Bits where only + - * / sqrt are used. The functions of two C libraries differ by a unit in the last
-        # place: sin of the pendulum, pow of the step control, which may then take another step.
+        # To the bit, but for the pendulum: the sine of the module's C library may differ in its last place, which
+        # changes a step of 1e-13 or so, of up to 1e3.
         for system, (count, message, rows), (native_count, native_message, native_rows) in zip(
                 systems(), self.runs, native()):
             self.assertEqual(count, native_count)
-            if count >= 0:
-                self.assertEqual(message, native_message)
+            self.assertEqual(message, native_message)
             for row, other in zip(rows, native_rows):
                 self.assertEqual(row[1], other[1])
-                if system in (BALL, BELT, DISCS):
+                if system != PENDULUM:
                     self.assertEqual(row[0], other[0])
                     self.assertEqual(row[3:], other[3:])
                 else:
