@@ -22,9 +22,8 @@ def _learn():
     except ModuleNotFoundError as error:
         raise ImportError(
             "ricochet: found a package without training, expected the module ricochet._learn: "
-            "build it with the CMake option RICOCHET_LEARN, or install it by CMAKE_ARGS="
-            "'-DRICOCHET_FAULTS=ON -DRICOCHET_LEARN=ON' pip install --no-build-isolation ."
-        ) from error
+            "build it with the CMake option RICOCHET_LEARN, or install the source distribution by "
+            "CMAKE_ARGS=-DRICOCHET_LEARN=ON pip install") from error
 
 
 class Trained:

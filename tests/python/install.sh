@@ -10,7 +10,7 @@ trap 'rm -rf "$work"' EXIT
 # A copy, so that nothing is left in the source tree.
 mkdir "$work/source"
 cd "$source"
-cp -r CMakeLists.txt LICENSE LICENSE-THIRD-PARTY cmake docs include models pyproject.toml python setup.py src "$work/source"
+cp -r CMakeLists.txt LICENSE LICENSE-THIRD-PARTY MANIFEST.in cmake docs include models pyproject.toml python setup.py src "$work/source"
 "$python" -m pip install --no-build-isolation --no-index --no-deps --target "$work/site" "$work/source"
 cd "$work"
 PYTHONPATH="$work/site" MPLBACKEND=Agg "$python" "$source/tests/python/run.py" \

@@ -50,7 +50,7 @@ def commands():
 
 class Workflows(unittest.TestCase):
     def test_there_are_some(self):
-        self.assertEqual(sorted(workflows()), ["checks.yml", "weekly.yml"])
+        self.assertEqual(sorted(workflows()), ["checks.yml", "weekly.yml", "wheels.yml"])
 
     def test_each_step_runs_a_script_of_the_repository(self):
         for where, words in commands():

@@ -1,0 +1,51 @@
+# For a wheel (RICOCHET_WHEEL): what it is built from are headers, of the system or of the build
+# requirements in pyproject.toml, and it is small.
+#
+# ricochet_headers_alone(<target> <header>): an imported target with the folder of the header.
+function(ricochet_headers_alone target header)
+    string(MAKE_C_IDENTIFIER ${target} name)
+    find_path(RICOCHET_${name}_INCLUDE_DIR ${header})
+    mark_as_advanced(RICOCHET_${name}_INCLUDE_DIR)
+    if(NOT RICOCHET_${name}_INCLUDE_DIR)
+        message(FATAL_ERROR "ricochet: found no ${header}, expected it in the system or in CMAKE_INCLUDE_PATH")
+    endif()
+    message(STATUS "ricochet: ${header} of ${RICOCHET_${name}_INCLUDE_DIR}")
+    add_library(${target} INTERFACE IMPORTED GLOBAL)
+    target_include_directories(${target} INTERFACE ${RICOCHET_${name}_INCLUDE_DIR})
+endfunction()
+
+ricochet_headers_alone(nlohmann_json::nlohmann_json nlohmann/json.hpp)
+ricochet_headers_alone(fmt::fmt fmt/format.h)
+target_compile_definitions(fmt::fmt INTERFACE FMT_HEADER_ONLY=1)  # so that no library of it is needed
+
+# Products of AArch64 have the bits of x86-64, whose baseline has no fused multiply-add.
+add_compile_options(-ffp-contract=off)
+set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
+if(CMAKE_SYSTEM_NAME STREQUAL Linux)
+    add_compile_options(-ffunction-sections -fdata-sections)
+    add_link_options(LINKER:--gc-sections LINKER:--as-needed LINKER:-s)
+endif()
+
+# Compiles small what calls the user's functions far more often than it computes, or is not hot at
+# all; the loop, its kernels, networks and scenes are compiled fast. Headers that are compiled
+# before would bring their own level with them.
+function(ricochet_small_parts)
+    foreach(target IN ITEMS ricochet_nonsmooth ricochet_fixed_sizes ricochet_scene_contact
+            ricochet_python_conversions)
+        if(TARGET ${target})
+            target_compile_options(${target} PRIVATE -Os)
+            set_target_properties(${target} PROPERTIES DISABLE_PRECOMPILE_HEADERS ON)
+        endif()
+    endforeach()
+endfunction()
+cmake_language(DEFER CALL ricochet_small_parts)
+
+# Mechanisms with contacts are not in Python, and the solvers of their sizes take long to compile.
+function(ricochet_unused_parts)
+    if(TARGET ricochet_fixed_sizes)
+        get_target_property(sources ricochet_fixed_sizes SOURCES)
+        list(REMOVE_ITEM sources contacts_2.cpp contacts_3.cpp)
+        set_target_properties(ricochet_fixed_sizes PROPERTIES SOURCES "${sources}")
+    endif()
+endfunction()
+cmake_language(DEFER CALL ricochet_unused_parts)
