@@ -20,7 +20,7 @@ from pathlib import Path
 #: What the sources of a distribution are made of; a copy, so that nothing is left in the source tree.
 TREE = ("CMakeLists.txt", "LICENSE", "LICENSE-THIRD-PARTY", "MANIFEST.in", "README.md", "cmake", "docs", "examples", "include",
         "models", "pyproject.toml", "python", "setup.py", "src", "tests")
-MOST_BYTES = 2_000_000
+MOST_BYTES = 2_600_000
 MOST_SYMBOLS = 100
 
 
