@@ -11,6 +11,7 @@ import html.parser
 import http.server
 import json
 import queue
+import re
 import shutil
 import subprocess
 import sys
@@ -26,7 +27,7 @@ SECTIONS = 7
 MOST_SECONDS = 60  # of the processor, for one build
 
 PROGRAM = """<!doctype html><meta charset="utf-8"><body><script type="module">
-const {pages, searches, width, first} = await (await fetch("/check.json")).json();
+const {pages, searches, ranking, width, first} = await (await fetch("/check.json")).json();
 const wide = [], found = {};
 const frame = document.createElement("iframe");
 frame.style.width = width + "px";
@@ -38,6 +39,7 @@ for (const page of pages) {
   if (seen > width) wide.push([page, seen]);
 }
 const pagefind = await import("/pagefind/pagefind.js");
+await pagefind.options({ranking});
 for (const words of searches) {
   const {results} = await pagefind.search(words);
   found[words] = (await Promise.all(results.slice(0, first).map((result) => result.data()))).map(({url}) => url);
@@ -135,6 +137,11 @@ def searches():
             yield words.strip(), {f"/{page}.html" for page in pages.split()}
 
 
+def ranking_of(page):
+    """How a page orders what it finds."""
+    return json.loads(re.search(r"const ranking = (\{.*?\});", page.read_text(encoding="utf-8"))[1])
+
+
 def build(source):
     before = time.monotonic(), *resources()
     if subprocess.run([source / "scripts" / "site"]).returncode:
@@ -173,7 +180,7 @@ def main(source, built):
     expected = dict(searches())
     task = {"pages": ["/" + path.relative_to(site).as_posix() for path in sorted(site.rglob("*.html"))
                       if "reference" not in path.parts and path.name not in ("index.html",) or path.parent.name == "docs"],
-            "searches": list(expected), "width": WIDTH, "first": FIRST}
+            "searches": list(expected), "ranking": ranking_of(site / "docs" / "index.html"), "width": WIDTH, "first": FIRST}
     seen = seen_by_a_browser(browser, site, task)
     print(f"{len(task['pages'])} pages shown, {len(seen['wide'])} wider than {WIDTH} pixels")
     lost = [f"{words}: {', '.join(seen['found'][words])}" for words, wanted in expected.items()
