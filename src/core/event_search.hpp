@@ -959,6 +959,10 @@ private:
     [[nodiscard]] double lacks(const CurrentStep& step, Bank& bank, const X& x, const TwoSum& at,
                                std::uint64_t& calls);
 
+    /// Whether every guard of the set has left its side at the state `space_.root`, which is
+    /// `ahead` [s] behind the set; the set is moved there if so.
+    bool holds_ahead(const CurrentStep& step, Bank& bank, double ahead, std::uint64_t& calls);
+
     /// Whether the only guard of the set is one whose bisection has ended at the set, so that its
     /// value there is `change_.at`.
     [[nodiscard]] bool is_at_change(const CurrentStep& step, const Hit& hit, const TwoSum& at,

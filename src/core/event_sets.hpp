@@ -153,6 +153,26 @@ inline double EventSearch<X, single>::lacks(const CurrentStep& step, Bank& bank,
 }
 
 template <class X, bool single>
+inline bool EventSearch<X, single>::holds_ahead(const CurrentStep& step, Bank& bank, double ahead,
+                                                std::uint64_t& calls)
+{
+    const X& x = space_.root;
+    const TwoSum at = two_sum(at_, at_remainder_ + ahead);
+    values_known_ = all_finite(x) && lacks(step, bank, x, at, calls) == 0;
+    if (!values_known_) return false;
+    at_ = at.value;
+    at_remainder_ = at.remainder;
+    if (has_lost_) {
+        for (std::size_t c = 0; c < static_cast<std::size_t>(x.size()); ++c) {
+            const auto i = static_cast<decltype(x.size())>(c);
+            lost_[i] += (before_[i] - x[i]) + ahead * rate_[i];
+        }
+    }
+    assign(before_, x);
+    return true;
+}
+
+template <class X, bool single>
 inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Bank& bank,
                                                     std::uint64_t& calls)
 {
@@ -169,21 +189,7 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
     const bool straight = straight_in_space_;
     keep_rate(step);
     X& x = space_.root;
-    const auto holds = [&](double ahead) {
-        const TwoSum at = two_sum(at_, at_remainder_ + ahead);
-        values_known_ = all_finite(x) && lacks(step, bank, x, at, calls) == 0;
-        if (!values_known_) return false;
-        at_ = at.value;
-        at_remainder_ = at.remainder;
-        if (has_lost_) {
-            for (std::size_t c = 0; c < static_cast<std::size_t>(x.size()); ++c) {
-                const auto i = static_cast<decltype(x.size())>(c);
-                lost_[i] += (before_[i] - x[i]) + ahead * rate_[i];
-            }
-        }
-        assign(before_, x);
-        return true;
-    };
+    const auto holds = [&](double ahead) { return holds_ahead(step, bank, ahead, calls); };
     for (int k = 0; k <= 8 && wait > 0 && wait < room; ++k, wait *= 2) {
         move(x, before_, wait, rate_);
         if (holds(wait)) return true;

@@ -351,6 +351,8 @@ private:
     }
     [[gnu::noinline]] void copy_to_mark();
     void go_back_to_mark();
+    void put_back_everything(const Mark& mark);
+    void cut_records(const Mark& mark, std::size_t samples, std::size_t pieces);
     void rewind_counts(const Mark& mark, std::uint64_t steps, std::uint64_t rejected);
 
     /// Keeps the state before a step that ends at a time event, or that needs further evaluations

@@ -104,6 +104,34 @@ void Loop<X, single>::rewind_counts(const Mark& mark, std::uint64_t steps, std::
     search_.disabled = mark.disabled;
 }
 
+/// Puts back what a search for events, or a time event, changes.
+template <class X, bool single>
+void Loop<X, single>::put_back_everything(const Mark& mark)
+{
+    step_.restart(mark.start);
+    bank_ = mark.bank;
+    flight_start_ = mark.flight_start;
+    longest_step_ = mark.longest_step;
+    last_h_ = mark.last_h;
+    time_event_ = mark.time_event;
+    resting_ = mark.resting;
+    holds_ = mark.holds;
+    this->resume_holds();
+    watching_ = mark.watching;
+}
+
+/// Drops what has been recorded since the mark.
+template <class X, bool single>
+void Loop<X, single>::cut_records(const Mark& mark, std::size_t samples, std::size_t pieces)
+{
+    run_.events.resize(mark.events);
+    run_.trajectory.t.resize(samples);
+    run_.trajectory.x.resize(samples);
+    if (run_.reactions.size() > samples) run_.reactions.resize(samples);
+    run_.solution.shrink(pieces);
+    next_sample_ = mark.next_sample;
+}
+
 template <class X, bool single>
 void Loop<X, single>::go_back_to_mark()
 {
@@ -114,16 +142,7 @@ void Loop<X, single>::go_back_to_mark()
     std::uint64_t steps = defers_ ? mark.counts.steps : run_.statistics.steps;
     if (mark.everything) {
         steps = mark.counts.steps;
-        step_.restart(mark.start);
-        bank_ = mark.bank;
-        flight_start_ = mark.flight_start;
-        longest_step_ = mark.longest_step;
-        last_h_ = mark.last_h;
-        time_event_ = mark.time_event;
-        resting_ = mark.resting;
-        holds_ = mark.holds;
-        this->resume_holds();
-        watching_ = mark.watching;
+        put_back_everything(mark);
     } else if (defers_) {
         step_.put_back_rate();
     }
@@ -151,14 +170,9 @@ void Loop<X, single>::go_back_to_mark()
         watching_ = false;
     }
     rewind_counts(mark, steps, rejected);
-    run_.events.resize(mark.events);
-    run_.trajectory.t.resize(samples);
-    run_.trajectory.x.resize(samples);
-    if (run_.reactions.size() > samples) run_.reactions.resize(samples);
-    run_.solution.shrink(pieces);
+    cut_records(mark, samples, pieces);
     run_.outcome = Outcome::reached_end;
     this->forget_cause();
-    next_sample_ = mark.next_sample;
     ended_ = false;
     pending_ = Engine::Pending::nothing;
     due_here_ = change_due_ = on_change_ = false;

@@ -48,6 +48,7 @@ std::string_view name(Outcome outcome) noexcept
     return "unknown";
 }
 
+// Long: a list with one sentence for each outcome.
 std::string_view describe(Outcome outcome) noexcept
 {
     switch (outcome) {

@@ -103,6 +103,7 @@ private:
     [[nodiscard]] bool ends_straight(const GuardSample& sample, double correction, Location& where);
     [[nodiscard]] bool close_in(const GuardSample& sample, double s, double& noise);
     void halve_along(const GuardSample& sample);
+    [[nodiscard]] double predicted();
     [[nodiscard]] double refined(double s, double u);
     [[nodiscard]] Location located(const TwoSum& root);
     void mark_jump(Location& where);
@@ -266,14 +267,21 @@ bool Search::ends_straight(const GuardSample& sample, double correction, Locatio
     return s;
 }
 
-Location Search::run()
+/// Where the cubic through the ends of the bracket has its root, refined where that is cheap.
+inline double Search::predicted()
 {
-    auto& [lo, hi] = bracket_;
+    const auto& [lo, hi] = bracket_;
     const double u =
         detail::hermite_root(unit_ * lo.value, unit_ * lo.rate * scale_.h, unit_ * hi.value,
                              unit_ * hi.rate * scale_.h, path_.side() == Side::above ? 1 : -1);
-    double s = lo.s + scale_.h * u;
-    if (path_.foretells()) s = refined(s, u);
+    const double s = lo.s + scale_.h * u;
+    return path_.foretells() ? refined(s, u) : s;
+}
+
+Location Search::run()
+{
+    auto& [lo, hi] = bracket_;
+    double s = predicted();
     double past = 0;
     double last_distance = std::numeric_limits<double>::infinity();
     double last_value = std::numeric_limits<double>::infinity();
