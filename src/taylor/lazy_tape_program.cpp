@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "ricochet/taylor/detail/lazy_tape.hpp"
@@ -34,6 +35,43 @@ static_assert(stride > most_taylor_order + 1);
 {
     const double twice = 2 * convolved(a, a, k, lo, (k - 1) / 2);
     return k % 2 == 0 && lo <= k / 2 ? twice + a[k / 2] * a[k / 2] : twice;
+}
+
+/// How a program computes operations of one kind.
+template <class Step>
+struct KindOf {
+    Step step{};
+    bool by_lanes = true;  ///< operands are places of lanes, rather than side by side
+};
+
+/// The step of a program for an operation, if there is one.
+template <class Step>
+[[nodiscard]] std::optional<KindOf<Step>> kind_of(TaylorOp op) noexcept
+{
+    using Kind = KindOf<Step>;
+    switch (op) {
+        case TaylorOp::sum: return Kind{Step::sum};
+        case TaylorOp::difference: return Kind{Step::difference};
+        case TaylorOp::negative:
+        case TaylorOp::constant_minus: return Kind{Step::negative};
+        case TaylorOp::plus_constant:
+        case TaylorOp::minus_constant: return Kind{Step::copy};
+        case TaylorOp::times_constant:
+        case TaylorOp::over_constant: return Kind{Step::times};
+        case TaylorOp::product: return Kind{Step::product, false};
+        case TaylorOp::square: return Kind{Step::square, false};
+        case TaylorOp::quotient: return Kind{Step::quotient, false};
+        case TaylorOp::constant_over: return Kind{Step::constant_over, false};
+        case TaylorOp::square_root: return Kind{Step::square_root, false};
+        case TaylorOp::exponential:
+        case TaylorOp::sine:
+        case TaylorOp::hyperbolic_sine:
+        case TaylorOp::hyperbolic_cosine: return Kind{Step::function, false};
+        case TaylorOp::cosine: return Kind{Step::cosine, false};
+        case TaylorOp::tangent: return Kind{Step::tangent, false};
+        case TaylorOp::hyperbolic_tangent: return Kind{Step::hyperbolic_tangent, false};
+        default: return std::nullopt;
+    }
 }
 
 }  // namespace
@@ -69,48 +107,21 @@ void LazyTape::write_program()
 bool LazyTape::append(const Batch& batch, std::vector<std::uint32_t>& sources)
 {
     if (batch.pass == Pass::copy) return true;
-    Instruction each{.for_guards = batch.for_guards,
-                     .degree = batch.degree,
-                     .degree_a = batch.degree_a,
-                     .degree_b = batch.degree_b};
-    bool by_lanes = true;  // operands are places of lanes, rather than side by side
-    std::size_t a = batch.a, b = batch.b;
-    if (batch.pass == Pass::slope) {
-        each.step = Step::slope;
-    } else if (batch.pass == Pass::combination) {
-        each.step = Step::combination;
-    } else {
-        switch (batch.op) {
-            case TaylorOp::input:
-            case TaylorOp::constant: return true;
-            case TaylorOp::sum: each.step = Step::sum; break;
-            case TaylorOp::difference: each.step = Step::difference; break;
-            case TaylorOp::negative:
-            case TaylorOp::constant_minus: each.step = Step::negative; break;
-            case TaylorOp::plus_constant:
-            case TaylorOp::minus_constant: each.step = Step::copy; break;
-            case TaylorOp::times_constant:
-            case TaylorOp::over_constant: each.step = Step::times; break;
-            default: by_lanes = false;
-        }
-    }
-    if (!by_lanes) {
-        switch (batch.op) {
-            case TaylorOp::product: each.step = Step::product; break;
-            case TaylorOp::square: each.step = Step::square; break;
-            case TaylorOp::quotient: each.step = Step::quotient; break;
-            case TaylorOp::constant_over: each.step = Step::constant_over; break;
-            case TaylorOp::square_root: each.step = Step::square_root; break;
-            case TaylorOp::exponential: b = batch.first; [[fallthrough]];
-            case TaylorOp::sine:
-            case TaylorOp::hyperbolic_sine:
-            case TaylorOp::hyperbolic_cosine: each.step = Step::function; break;
-            case TaylorOp::cosine: each.step = Step::cosine; break;
-            case TaylorOp::tangent: each.step = Step::tangent; break;
-            case TaylorOp::hyperbolic_tangent: each.step = Step::hyperbolic_tangent; break;
-            default: return false;
-        }
-    }
+    const bool is_operation = batch.pass == Pass::operation;
+    const bool is_given = batch.op == TaylorOp::input || batch.op == TaylorOp::constant;
+    if (is_operation && is_given) return true;
+    std::optional<KindOf<Step>> kind = kind_of<Step>(batch.op);
+    if (batch.pass == Pass::slope) kind = KindOf<Step>{Step::slope};
+    if (batch.pass == Pass::combination) kind = KindOf<Step>{Step::combination};
+    if (!kind) return false;
+    const Instruction each{.step = kind->step,
+                           .for_guards = batch.for_guards,
+                           .degree = batch.degree,
+                           .degree_a = batch.degree_a,
+                           .degree_b = batch.degree_b};
+    const bool by_lanes = kind->by_lanes;
+    const bool of_itself = is_operation && batch.op == TaylorOp::exponential;
+    const std::size_t a = batch.a, b = of_itself ? batch.first : batch.b;
     const bool sloped = each.step >= Step::function;
     for (std::size_t l = 0; l < batch.lanes.size(); ++l) {
         Instruction next = each;

@@ -255,107 +255,149 @@ Ball ball_of(const FourBoxes<3>& boxes, std::size_t i) noexcept
 
 }  // namespace
 
-NearestFaces Triangles::nearest(const Triangles& body, const Pose& pose,
-                                const NearestFaces& hint) const noexcept
-{
-    BestPair best;
-    if (!finite(pose)) {
-        best.found = {};
-        best.found.distance = nan;
-        return best.found;
-    }
+/// The search for the nearest faces of a mesh and of a body that is displaced by `pose`.
+class Triangles::PairSearch {
+public:
+    PairSearch(const Triangles& mesh, const Triangles& body, const Pose& pose) noexcept
+        : mesh_(mesh), body_(body), pose_(pose)
     {
-        const std::uint32_t face = hint.face < size() ? hint.face : 0;
-        const std::uint32_t other = hint.other_face < body.size() ? hint.other_face : 0;
-        best.offer(triangles_[face], face, moved(body[other], pose), other);
     }
-    // Alternating projections between the surfaces soon come near the nearest pair, or a pair that
-    // is hardly further apart. The search that follows then has little more to do than to prove it.
-    Vector3d from = best.found.other_point;
-    for (int turn = 0; turn < most_turns; ++turn) {
-        const NearestOnTriangle here = nearest(from, best.found.face);
-        const NearestOnTriangle there = body.nearest(
-            pose.rotation.transpose() * (here.point - pose.translation), best.found.other_face);
-        const double before = best.found.distance;
-        best.offer(triangles_[here.triangle], here.triangle, moved(body[there.triangle], pose),
-                   there.triangle);
-        if (!(best.found.distance < before)) break;
-        from = best.found.other_point;
+
+    [[nodiscard]] const NearestFaces& best() const noexcept { return best_.found; }
+
+    void start_at(const NearestFaces& hint) noexcept;
+    void project_by_turns() noexcept;
+    void search_trees() noexcept;
+
+private:
+    [[nodiscard]] Ball placed(const Ball& ball) const noexcept
+    {
+        return {pose_.rotation * ball.centre + pose_.translation, ball.radius};
     }
-    const auto ball_at = [&](const Ball& ball) {
-        return Ball{pose.rotation * ball.centre + pose.translation, ball.radius};
-    };
-    // Squared radius around the centre of a ball within which a part of this mesh may be nearer to
-    // the ball's contents than the best pair so far; 1e-12 for rounding.
-    const auto squared_reach = [&](double radius) {
-        const double reach = (best.found.distance + radius) * (1 + 1e-12);
+    /// Squared radius around the centre of a ball within which a part of the mesh may be nearer to
+    /// the ball's contents than the best pair so far; 1e-12 for rounding.
+    [[nodiscard]] double squared_reach(double radius) const noexcept
+    {
+        const double reach = (best_.found.distance + radius) * (1 + 1e-12);
         return std::min(reach * reach, largest);
-    };
-    // A part of the body is opened only if this mesh comes near the ball around it.
-    const auto comes_near = [&](const Ball& ball) {
-        const std::array<double, 3> at = coordinates(ball.centre);
-        double reach = squared_reach(ball.radius);
-        bool near = false;
-        tree_.search(
-            reach,
-            [&](const FourBoxes<3>& boxes) {
-                if (near) return std::array{largest, largest, largest, largest};
-                return squared_distances(boxes, at, at);
-            },
-            [&](std::size_t first, std::size_t last) {
-                for (std::size_t i = first; i < last && !near; ++i) {
-                    const Triangle& t = triangles_[tree_.order()[i]];
-                    near = (nearest_point(t, ball.centre) - ball.centre).squaredNorm() <= reach;
+    }
+    [[nodiscard]] bool comes_near(const Ball& ball) const noexcept;
+    void compare(std::uint32_t other) noexcept;
+
+    const Triangles& mesh_;
+    const Triangles& body_;
+    const Pose& pose_;
+    BestPair best_;
+};
+
+void Triangles::PairSearch::start_at(const NearestFaces& hint) noexcept
+{
+    const std::uint32_t face = hint.face < mesh_.size() ? hint.face : 0;
+    const std::uint32_t other = hint.other_face < body_.size() ? hint.other_face : 0;
+    best_.offer(mesh_[face], face, moved(body_[other], pose_), other);
+}
+
+/// Alternating projections between the surfaces soon come near the nearest pair, or a pair that is
+/// hardly further apart. The search that follows then has little more to do than to prove it.
+void Triangles::PairSearch::project_by_turns() noexcept
+{
+    Vector3d from = best_.found.other_point;
+    for (int turn = 0; turn < most_turns; ++turn) {
+        const NearestOnTriangle here = mesh_.nearest(from, best_.found.face);
+        const NearestOnTriangle there = body_.nearest(
+            pose_.rotation.transpose() * (here.point - pose_.translation), best_.found.other_face);
+        const double before = best_.found.distance;
+        best_.offer(mesh_[here.triangle], here.triangle, moved(body_[there.triangle], pose_),
+                    there.triangle);
+        if (!(best_.found.distance < before)) break;
+        from = best_.found.other_point;
+    }
+}
+
+/// Whether the mesh comes near a ball, so that its contents may hold a nearer face.
+bool Triangles::PairSearch::comes_near(const Ball& ball) const noexcept
+{
+    const std::array<double, 3> at = coordinates(ball.centre);
+    double reach = squared_reach(ball.radius);
+    bool near = false;
+    mesh_.tree_.search(
+        reach,
+        [&](const FourBoxes<3>& boxes) {
+            if (near) return std::array{largest, largest, largest, largest};
+            return squared_distances(boxes, at, at);
+        },
+        [&](std::size_t first, std::size_t last) {
+            for (std::size_t i = first; i < last && !near; ++i) {
+                const Triangle& t = mesh_[mesh_.tree_.order()[i]];
+                near = (nearest_point(t, ball.centre) - ball.centre).squaredNorm() <= reach;
+            }
+            if (near) reach = -1;
+        });
+    return near;
+}
+
+/// Compares the faces of the mesh with a face of the body.
+void Triangles::PairSearch::compare(std::uint32_t other) noexcept
+{
+    const Ball ball = placed(body_.balls_[other]);
+    if (!comes_near(ball)) return;
+    const Triangle triangle = moved(body_[other], pose_);
+    const std::array<double, 3> at = coordinates(ball.centre);
+    double reach = squared_reach(ball.radius);
+    mesh_.tree_.search(
+        reach, [&](const FourBoxes<3>& boxes) { return squared_distances(boxes, at, at); },
+        [&](std::size_t first, std::size_t last) {
+            for (std::size_t i = first; i < last; ++i) {
+                const std::uint32_t face = mesh_.tree_.order()[i];
+                const Ball& around = mesh_.balls_[face];
+                const double within = best_.found.distance + ball.radius + around.radius;
+                if ((around.centre - ball.centre).squaredNorm() > within * within * (1 + 1e-12)) {
+                    continue;
                 }
-                if (near) reach = -1;
-            });
-        return near;
-    };
-    const auto look = [&](std::uint32_t other) {
-        const Ball ball = ball_at(body.balls_[other]);
-        if (!comes_near(ball)) return;
-        const Triangle triangle = moved(body[other], pose);
-        const std::array<double, 3> at = coordinates(ball.centre);
-        double reach = squared_reach(ball.radius);
-        tree_.search(
-            reach, [&](const FourBoxes<3>& boxes) { return squared_distances(boxes, at, at); },
-            [&](std::size_t first, std::size_t last) {
-                for (std::size_t i = first; i < last; ++i) {
-                    const std::uint32_t face = tree_.order()[i];
-                    const double within = best.found.distance + ball.radius + balls_[face].radius;
-                    if ((balls_[face].centre - ball.centre).squaredNorm() >
-                        within * within * (1 + 1e-12)) {
-                        continue;
-                    }
-                    const Vector3d near = nearest_point(triangles_[face], ball.centre);
-                    if ((near - ball.centre).squaredNorm() > squared_reach(ball.radius)) continue;
-                    best.offer(triangles_[face], face, triangle, other);
-                }
-                reach = squared_reach(ball.radius);
-            });
-    };
+                const Vector3d near = nearest_point(mesh_[face], ball.centre);
+                if ((near - ball.centre).squaredNorm() > squared_reach(ball.radius)) continue;
+                best_.offer(mesh_[face], face, triangle, other);
+            }
+            reach = squared_reach(ball.radius);
+        });
+}
+
+/// Opens the parts of the body whose balls the mesh comes near.
+void Triangles::PairSearch::search_trees() noexcept
+{
     struct Part {
         std::size_t level, index;
     };
     std::array<Part, 64> parts;
     std::size_t count = 0;
-    parts[count++] = {body.tree_.levels(), 0};
+    const BoxTree<3>& tree = body_.tree_;
+    parts[count++] = {tree.levels(), 0};
     while (count > 0) {
         const Part part = parts[--count];
         if (part.level == 0) {
-            const std::size_t last = std::min(4 * part.index + 4, body.size());
-            for (std::size_t i = 4 * part.index; i < last; ++i) look(body.tree_.order()[i]);
+            const std::size_t last = std::min(4 * part.index + 4, body_.size());
+            for (std::size_t i = 4 * part.index; i < last; ++i) compare(tree.order()[i]);
             continue;
         }
-        const FourBoxes<3>& boxes = body.tree_.level(part.level - 1)[part.index];
+        const FourBoxes<3>& boxes = tree.level(part.level - 1)[part.index];
         for (std::size_t i = 0; i < 4; ++i) {
             if (!(boxes.lower[0][i] <= boxes.upper[0][i])) continue;
-            if (comes_near(ball_at(ball_of(boxes, i)))) {
+            if (comes_near(placed(ball_of(boxes, i)))) {
                 parts[count++] = {part.level - 1, 4 * part.index + i};
             }
         }
     }
-    return best.found;
+}
+
+NearestFaces Triangles::nearest(const Triangles& body, const Pose& pose,
+                                const NearestFaces& hint) const noexcept
+{
+    if (!finite(pose)) return {.distance = nan};
+    PairSearch search(*this, body, pose);
+    search.start_at(hint);
+    search.project_by_turns();
+    search.search_trees();
+    return search.best();
 }
 
 NearestFaces Triangles::nearest_brute(const Triangles& body, const Pose& pose) const noexcept

@@ -67,6 +67,8 @@ public:
     [[nodiscard]] std::vector<Ball> covering(std::size_t most) const;
 
 private:
+    class PairSearch;
+
     std::vector<Triangle> triangles_;
     std::vector<Ball> balls_;  ///< around each
     BoxTree<3> tree_;
