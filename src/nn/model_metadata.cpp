@@ -191,39 +191,10 @@ std::vector<double> pairs(const std::vector<GateLevel>& levels)
     return values;
 }
 
-}  // namespace
-
-void check_version(const Header& header, const Refusal& refuse)
+/// Reads how features are normalised, and the box that they are trained in.
+void read_features(const Metadata& metadata, const Refusal& refuse, Model& model)
 {
-    const std::string& version = Metadata(header, refuse).text("ricochet");
-    if (version != format_version) {
-        refuse("metadata \"ricochet\"", "format version " + in_quotes(format_version),
-               in_quotes(version));
-    }
-}
-
-void read_metadata(const Header& header, const Refusal& refuse, Model& model)
-{
-    const Metadata metadata(header, refuse);
     const std::size_t inputs = model.layers.front().inputs;
-    const std::size_t outputs = model.layers.back().outputs;
-
-    model.kind = metadata.text("kind");
-    if (std::ranges::find(known_kinds, model.kind) == known_kinds.end()) {
-        refuse("metadata \"kind\"",
-               in_quotes(known_kinds[0]) + ", " + in_quotes(known_kinds[1]) + ", " +
-                   in_quotes(known_kinds[2]) + ", " + in_quotes(known_kinds[3]) + ", " +
-                   in_quotes(known_kinds[4]) + " or " + in_quotes(known_kinds[5]),
-               in_quotes(model.kind));
-    }
-    model.activation = read_activation(metadata, model.kind == "guard", refuse);
-    if (metadata.has("residual")) read_residual(metadata, refuse, model);
-
-    model.system = metadata.text("system");
-    model.parameters = metadata.named_numbers("parameters");
-    model.recipe = metadata.text("recipe");
-    model.seed = metadata.integer("seed");
-
     model.offset = metadata.numbers("offset", inputs);
     model.scale = metadata.numbers("scale", inputs);
     for (std::size_t i = 0; i < inputs; ++i) {
@@ -244,7 +215,51 @@ void read_metadata(const Header& header, const Refusal& refuse, Model& model)
         }
         model.domain.push_back(range);
     }
+}
 
+/// Reads the features of the self-test and the outputs that they give.
+void read_self_test(const Metadata& metadata, const Refusal& refuse, Model& model)
+{
+    model.self_test.input = metadata.numbers("self_test_input", model.layers.front().inputs);
+    for (const double value : model.self_test.input) {
+        if (!std::isfinite(value)) {
+            refuse("metadata \"self_test_input\"", "finite numbers", decimal(value));
+        }
+    }
+    model.self_test.output = metadata.numbers("self_test_output", model.layers.back().outputs);
+}
+
+}  // namespace
+
+void check_version(const Header& header, const Refusal& refuse)
+{
+    const std::string& version = Metadata(header, refuse).text("ricochet");
+    if (version != format_version) {
+        refuse("metadata \"ricochet\"", "format version " + in_quotes(format_version),
+               in_quotes(version));
+    }
+}
+
+void read_metadata(const Header& header, const Refusal& refuse, Model& model)
+{
+    const Metadata metadata(header, refuse);
+    model.kind = metadata.text("kind");
+    if (std::ranges::find(known_kinds, model.kind) == known_kinds.end()) {
+        refuse("metadata \"kind\"",
+               in_quotes(known_kinds[0]) + ", " + in_quotes(known_kinds[1]) + ", " +
+                   in_quotes(known_kinds[2]) + ", " + in_quotes(known_kinds[3]) + ", " +
+                   in_quotes(known_kinds[4]) + " or " + in_quotes(known_kinds[5]),
+               in_quotes(model.kind));
+    }
+    model.activation = read_activation(metadata, model.kind == "guard", refuse);
+    if (metadata.has("residual")) read_residual(metadata, refuse, model);
+
+    model.system = metadata.text("system");
+    model.parameters = metadata.named_numbers("parameters");
+    model.recipe = metadata.text("recipe");
+    model.seed = metadata.integer("seed");
+
+    read_features(metadata, refuse, model);
     model.threshold = metadata.number("threshold");
     if (std::isnan(model.threshold)) refuse("metadata \"threshold\"", "a number", "nan");
 
@@ -256,13 +271,7 @@ void read_metadata(const Header& header, const Refusal& refuse, Model& model)
                decimal(model.step_min) + " and " + decimal(model.step_max));
     }
 
-    model.self_test.input = metadata.numbers("self_test_input", inputs);
-    for (const double value : model.self_test.input) {
-        if (!std::isfinite(value)) {
-            refuse("metadata \"self_test_input\"", "finite numbers", decimal(value));
-        }
-    }
-    model.self_test.output = metadata.numbers("self_test_output", outputs);
+    read_self_test(metadata, refuse, model);
     if (header.metadata.contains("certificate")) model.certificate = metadata.text("certificate");
     if (model.kind.starts_with("gate-")) read_gate(metadata, refuse, model);
 }
