@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -217,17 +218,14 @@ std::string calibration(const Calibration& c)
         c.misses, c.events, c.miss_bound, c.steps, c.seed);
 }
 
-std::string to_text(const Inspection& found)
-{
-    const Model& model = found.model;
-    std::string out;
-    const auto line = [&](std::string_view name, const std::string& value) {
-        out += fmt::format("{:<13}{}\n", name, value);
-    };
-    const std::string unknown_here = " (not known here)";
-    line("file", fmt::format("{}, {} bytes", printable(found.file.string()), found.bytes));
-    line("kind", printable(model.kind));
+constexpr std::string_view unknown_here = " (not known here)";
 
+/// Adds a line with a name and a value.
+using AddLine = std::function<void(std::string_view name, const std::string& value)>;
+
+/// The system that the model is for, its parameters and its steps.
+void add_system(const Model& model, const AddLine& line)
+{
     std::vector<std::string> parameters;
     for (const auto& [name, value] : model.parameters) {
         parameters.push_back(fmt::format("{} = {}", printable(name), value));
@@ -241,6 +239,11 @@ std::string to_text(const Inspection& found)
                           ? fmt::format("{} s only", model.step_min)
                           : fmt::format("{} to {} s", model.step_min, model.step_max));
     }
+}
+
+/// The features, and the network that they are put into.
+void add_network(const Model& model, const AddLine& line)
+{
     line("recipe",
          fmt::format("{}{}", printable(model.recipe), recipe_known(model) ? "" : unknown_here));
     const std::vector<std::string> names = feature_names(model);
@@ -256,6 +259,11 @@ std::string to_text(const Inspection& found)
         line(k == 0 ? "layers" : "", fmt::format("{}: weight {} x {}, bias {}", k, layer.outputs,
                                                  layer.inputs, layer.outputs));
     }
+}
+
+/// The decision that is taken by the output.
+void add_decision(const Model& model, const AddLine& line)
+{
     if (is_policy(model)) {
         line("decision",
              fmt::format("the classical step times exp(output), held to [{:.3g}, {:.3g}]",
@@ -277,6 +285,20 @@ std::string to_text(const Inspection& found)
                          horizon ? fmt::format("logit {}", k) : "the logit", level.threshold));
     }
     if (!model.levels.empty()) line("calibrated", calibration(model.calibration));
+}
+
+std::string to_text(const Inspection& found)
+{
+    const Model& model = found.model;
+    std::string out;
+    const auto line = [&](std::string_view name, const std::string& value) {
+        out += fmt::format("{:<13}{}\n", name, value);
+    };
+    line("file", fmt::format("{}, {} bytes", printable(found.file.string()), found.bytes));
+    line("kind", printable(model.kind));
+    add_system(model, line);
+    add_network(model, line);
+    add_decision(model, line);
     line("seed", fmt::format("{}", model.seed));
     line("self-test",
          fmt::format("reproduced: {} gives {}, recorded {}", numbers(model.self_test.input),

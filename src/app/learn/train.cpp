@@ -125,15 +125,35 @@ std::string text(const learn::GateReport& report)
     return out + fmt::format("{}\n", describe(report.outcome));
 }
 
+/// The kind of gate to train; the first that the system has where none is given.
+/// @throws BadInput for one that it does not have
+std::string_view gate_kind(const SystemEntry& system, std::string_view given)
+{
+    const std::vector<std::string_view> kinds = gate_kinds(system.name);
+    if (given.empty()) return kinds.front();
+    const auto found = std::find(kinds.begin(), kinds.end(), given);
+    if (found != kinds.end()) return *found;
+    throw unknown(fmt::format("kind of network for {}", system.name), given, kinds);
+}
+
+/// Says that the model misses events and is not written, and where the checkpoint is, if any.
+void say_not_written(const fs::path& checkpoint)
+{
+    say("ricochet: events are missed and no model was written; --allow-misses writes the "
+        "model all the same, with its miss rate\n");
+    std::error_code error;
+    if (fs::exists(checkpoint, error)) {
+        say("ricochet: the best is kept in '{}'; the same command with --resume "
+            "--allow-misses writes it\n",
+            checkpoint.string());
+    }
+}
+
 /// Trains a gate, like `train`.
 int train_gate(const SystemEntry& system, const TrainRequest& request)
 {
     TrainingRequest training = request.training;
-    const std::vector<std::string_view> kinds = gate_kinds(system.name);
-    if (training.kind.empty()) training.kind = kinds.front();
-    if (std::find(kinds.begin(), kinds.end(), training.kind) == kinds.end()) {
-        throw unknown(fmt::format("kind of network for {}", system.name), training.kind, kinds);
-    }
+    training.kind = gate_kind(system, training.kind);
     const bool own_checkpoint = training.checkpoint.empty();
     claim_training(request.out, training.checkpoint, training.resume);
     ProgressBar bar;
@@ -183,14 +203,7 @@ int train_gate(const SystemEntry& system, const TrainRequest& request)
         say("ricochet: {}, and no model was written\n", describe(report.outcome));
         return 1;
     }
-    say("ricochet: events are missed and no model was written; --allow-misses writes the "
-        "model all the same, with its miss rate\n");
-    std::error_code error;
-    if (fs::exists(training.checkpoint, error)) {
-        say("ricochet: the best is kept in '{}'; the same command with --resume "
-            "--allow-misses writes it\n",
-            training.checkpoint.string());
-    }
+    say_not_written(training.checkpoint);
     return 1;
 }
 

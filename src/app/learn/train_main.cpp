@@ -53,6 +53,20 @@ const TrainRequest& event_network(const TrainRequest& request, const TrainPolicy
     return request;
 }
 
+/// Adds the options that are for a step policy alone.
+void add_policy_options(CLI::App& command, TrainPolicyRequest& policy)
+{
+    add_number(command, "--seconds", policy.seconds, "S", "of a step policy: stop then [s]");
+    add_whole_number(command, "--threads", policy.threads, 1, 64, "of a step policy, default 2");
+    command
+        .add_option("--trainer", policy.trainer,
+                    "of a step policy: evolution (default; the true cost), or tqc or td3 with the "
+                    "published reward")
+        ->type_name("NAME");
+    add_number(command, "--alpha", policy.alpha, "A",
+               "of the published reward: weight of the error, default 2");
+}
+
 void add_train(CLI::App& app, int& status)
 {
     CLI::App& command = *app.add_subcommand(
@@ -96,15 +110,7 @@ void add_train(CLI::App& app, int& status)
     command.add_flag("--allow-misses", request->allow_misses,
                      "write the model even if it misses events");
     command.add_flag("--json", request->json, "print the report as JSON");
-    add_number(command, "--seconds", policy->seconds, "S", "of a step policy: stop then [s]");
-    add_whole_number(command, "--threads", policy->threads, 1, 64, "of a step policy, default 2");
-    command
-        .add_option("--trainer", policy->trainer,
-                    "of a step policy: evolution (default; the true cost), or tqc or td3 with the "
-                    "published reward")
-        ->type_name("NAME");
-    add_number(command, "--alpha", policy->alpha, "A",
-               "of the published reward: weight of the error, default 2");
+    add_policy_options(command, *policy);
     command.footer(
         "Examples:\n"
         "  ricochet train bouncing-ball --out ball.safetensors\n"

@@ -156,6 +156,45 @@ std::string table(const SystemEntry& system, const RunSettings& settings,
     return out;
 }
 
+/// Times of the samples, from the start to the end.
+std::vector<double> sample_times(const Options& options)
+{
+    std::vector<double> times(grid);
+    const double span = options.t_end - options.t_start;
+    for (std::size_t i = 0; i < grid; ++i) {
+        times[i] = options.t_start + span * static_cast<double>(i) / static_cast<double>(grid - 1);
+    }
+    times.back() = options.t_end;
+    return times;
+}
+
+Json json_of(const std::vector<Measured>& rows)
+{
+    Json methods = Json::array();
+    for (const Measured& row : rows) {
+        methods.push_back({{"method", row.label},
+                           {"steps", row.steps},
+                           {"solves", row.solves},
+                           {"events", row.events},
+                           {"seconds", row.seconds},
+                           {"l2", row.l2},
+                           {"relative", row.relative},
+                           {"largest", row.largest},
+                           {"reached_end", row.ended}});
+    }
+    return methods;
+}
+
+std::string csv_of(const std::vector<Measured>& rows)
+{
+    std::string csv = "method,steps,solves,events,seconds,L2,relative,largest\n";
+    for (const Measured& row : rows) {
+        csv += fmt::format("\"{}\",{},{},{},{},{},{},{}\n", row.label, row.steps, row.solves,
+                           row.events, row.seconds, row.l2, row.relative, row.largest);
+    }
+    return csv;
+}
+
 }  // namespace
 
 int compare_set_valued(const SystemEntry& system, const CompareRequest& request)
@@ -165,13 +204,7 @@ int compare_set_valued(const SystemEntry& system, const CompareRequest& request)
     const RunSettings settings = resolve(system, base);
     Claims claims;
     if (request.csv) claims.writes("--csv", *request.csv);
-    std::vector<double> times(grid);
-    const double start = settings.options.t_start;
-    const double span = settings.options.t_end - start;
-    for (std::size_t i = 0; i < grid; ++i) {
-        times[i] = start + span * static_cast<double>(i) / static_cast<double>(grid - 1);
-    }
-    times.back() = settings.options.t_end;
+    const std::vector<double> times = sample_times(settings.options);
     const Interrupts interrupts;
     std::optional<RunWatch> watch(0.25);
     const auto exact = reference(system, base, times);
@@ -189,22 +222,8 @@ int compare_set_valued(const SystemEntry& system, const CompareRequest& request)
     const bool complete = rows.size() == all.size();
     Json json{{"system", system.name}, {"t_end", settings.options.t_end}};
     if (!complete) json["incomplete"] = Interrupts::cause();
-    Json methods = Json::array();
-    std::string csv = "method,steps,solves,events,seconds,L2,relative,largest\n";
-    for (const Measured& row : rows) {
-        methods.push_back({{"method", row.label},
-                           {"steps", row.steps},
-                           {"solves", row.solves},
-                           {"events", row.events},
-                           {"seconds", row.seconds},
-                           {"l2", row.l2},
-                           {"relative", row.relative},
-                           {"largest", row.largest},
-                           {"reached_end", row.ended}});
-        csv += fmt::format("\"{}\",{},{},{},{},{},{},{}\n", row.label, row.steps, row.solves,
-                           row.events, row.seconds, row.l2, row.relative, row.largest);
-    }
-    json["methods"] = std::move(methods);
+    json["methods"] = json_of(rows);
+    std::string csv = csv_of(rows);
     // They are for the defaults.
     const std::vector<std::string_view> published =
         request.set.empty() ? system.published_errors : std::vector<std::string_view>{};

@@ -47,6 +47,17 @@ double tolerance(std::string_view option, const std::optional<double>& given, do
     return given.value_or(otherwise);
 }
 
+/// @param steps  whether all steps are set-valued
+/// @throws BadInput for tolerances that are negative, or both zero
+void choose_tolerances(const RunRequest& request, bool steps, Options& options)
+{
+    options.rtol = tolerance("--rtol", request.rtol, steps ? default_rtol_of_steps : default_rtol);
+    options.atol = tolerance("--atol", request.atol, steps ? default_atol_of_steps : default_atol);
+    if (options.rtol + options.atol == 0) {
+        throw BadInput("--rtol or --atol must be positive, got zero for both");
+    }
+}
+
 /// Inputs of the policies of a system.
 /// @throws BadInput naming the systems that have policies.
 const StepLayout& layout_of(const SystemEntry& system)
@@ -122,11 +133,7 @@ bool choose_set_valued(const SystemEntry& system, const RunRequest& request, Run
                         "of at least {}, got {}",
                         options.t_start, options.t_end));
     }
-    options.rtol = tolerance("--rtol", request.rtol, steps ? default_rtol_of_steps : default_rtol);
-    options.atol = tolerance("--atol", request.atol, steps ? default_atol_of_steps : default_atol);
-    if (options.rtol + options.atol == 0) {
-        throw BadInput("--rtol or --atol must be positive, got zero for both");
-    }
+    choose_tolerances(request, steps, options);
     settings.fixed_step = steps && !controlled;
     options.step = settings.fixed_step ? chosen.step : 0;
     settings.set_valued = std::move(chosen);
