@@ -6,6 +6,7 @@
 #include <memory>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "callbacks.hpp"
 #include "formula_door.hpp"
@@ -31,6 +32,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 /// Door of one run to a system of callbacks, with the arrays that its callbacks are shown.
 class CallbackDoor final : public RunDoor {
     using Table = detail::SystemTable<State>;
+    using Guards = std::vector<CallbackGuard>;
 
 public:
     explicit CallbackDoor(const CallbackSource& source)
@@ -63,15 +65,6 @@ public:
 
     static void fill(Table& table, const CallbackSource& source)
     {
-        const auto& guards = source.guards_;
-        const auto any = [&](auto member) {
-            return std::any_of(guards.begin(), guards.end(),
-                               [&](const CallbackGuard& guard) { return bool(guard.*member); });
-        };
-        const auto every = [&](auto member) {
-            return std::all_of(guards.begin(), guards.end(),
-                               [&](const CallbackGuard& guard) { return bool(guard.*member); });
-        };
         table.moded = source.moded_;
         table.flow = [](void* door, Mode mode, double t, const State& x, State& dxdt) {
             return at(door).flow(mode, t, x, dxdt);
@@ -79,6 +72,36 @@ public:
         table.mode_count = [](void* door) { return at(door).source_.mode_count_; };
         table.guard_count = [](void* door) { return at(door).source_.guards_.size(); };
         table.name = [](void* door) { return at(door).name(); };
+        fill_time_events(table, source);
+        const Guards& guards = source.guards_;
+        if (guards.empty()) return;
+        fill_guards(table, source);
+        fill_enabled(table, guards);
+        fill_resets(table, source);
+        if (every(guards, &CallbackGuard::speed_bound)) fill_bounds(table, guards);
+    }
+
+private:
+    class Inclusion;
+
+    /// Whether any guard, or every one, has a function or a property.
+    template <class Member>
+    [[nodiscard]] static bool any(const Guards& guards, Member member)
+    {
+        return std::any_of(guards.begin(), guards.end(),
+                           [&](const CallbackGuard& guard) { return bool(guard.*member); });
+    }
+    template <class Member>
+    [[nodiscard]] static bool every(const Guards& guards, Member member)
+    {
+        return std::all_of(guards.begin(), guards.end(),
+                           [&](const CallbackGuard& guard) { return bool(guard.*member); });
+    }
+
+    // --- parts of the table ---
+
+    static void fill_time_events(Table& table, const CallbackSource& source)
+    {
         if (source.times_) {
             table.next_time_event = [](void* door, double t) {
                 return at(door).source_.times_->next(t);
@@ -110,10 +133,13 @@ public:
                 return at(door).time_reset(mode, t, x);
             };
         }
-        if (guards.empty()) return;
+    }
+
+    static void fill_guards(Table& table, const CallbackSource& source)
+    {
         table.guarded = true;
         table.guard_alone = !source.guard_values_;
-        table.rated = every(&CallbackGuard::rate);
+        table.rated = every(source.guards_, &CallbackGuard::rate);
         table.calls_of_rate = table.rated ? 0 : 2;
         table.info = [](void* door, std::size_t which) {
             return at(door).source_.guards_[which].info;
@@ -137,45 +163,49 @@ public:
                 }
             };
         }
+    }
+
+    static void fill_enabled(Table& table, const Guards& guards)
+    {
         if (std::any_of(guards.begin(), guards.end(),
                         [](const CallbackGuard& guard) { return !guard.in_mode.empty(); })) {
             table.enabled_in = [](void* door, std::size_t which, Mode mode) {
                 return at(door).is_in(which, mode);
             };
         }
-        if (any(&CallbackGuard::enabled)) {
+        if (any(guards, &CallbackGuard::enabled)) {
             table.enabled_at = [](void* door, std::size_t which, Mode mode, double t,
                                   const State& x) { return at(door).enabled(which, mode, t, x); };
         }
+    }
+
+    static void fill_resets(Table& table, const CallbackSource& source)
+    {
+        const Guards& guards = source.guards_;
         if (source.reset_set_) {
             table.reset_set = [](void* door, const FiredGuards& fired, Mode mode, double t,
                                  State& x) { return at(door).reset_set(fired, mode, t, x); };
-        } else if (any(&CallbackGuard::reset)) {
+        } else if (any(guards, &CallbackGuard::reset)) {
             table.reset = [](void* door, std::size_t which, Mode mode, double t, State& x) {
                 const CallbackGuard& guard = at(door).source_.guards_[which];
                 if (guard.directed) return at(door).reset_by_direction(guard, mode, t, x);
                 return at(door).edit(guard.reset, "reset of ", guard.owner, mode, t, x);
             };
-            if (any(&CallbackGuard::directed)) {
+            if (any(guards, &CallbackGuard::directed)) {
                 table.tell_direction = [](void* door, Crossing direction) {
                     at(door).direction_ = direction;
                 };
             }
         }
-        if (any(&CallbackGuard::rest)) {
+        if (any(guards, &CallbackGuard::rest)) {
             table.rest = [](void* door, std::size_t which, Mode mode, double t, State& x) {
                 const CallbackGuard& guard = at(door).source_.guards_[which];
                 return at(door).edit(guard.rest, "rest of ", guard.owner, mode, t, x, false);
             };
         }
-        if (every(&CallbackGuard::speed_bound)) fill_bounds(table, any);
     }
 
-private:
-    class Inclusion;
-
-    template <class Any>
-    static void fill_bounds(Table& table, const Any& any)
+    static void fill_bounds(Table& table, const Guards& guards)
     {
         table.bounded = true;
         table.lipschitz = [](void* door, std::size_t which) {
@@ -183,10 +213,10 @@ private:
         };
         table.speed_bound = &bound<&CallbackGuard::speed_bound>;
         table.acceleration_bound = &bound<&CallbackGuard::acceleration_bound>;
-        if (any(&CallbackGuard::lower_bound)) {
+        if (any(guards, &CallbackGuard::lower_bound)) {
             table.lower_bound = &bound<&CallbackGuard::lower_bound>;
         }
-        if (any(&CallbackGuard::upper_bound)) {
+        if (any(guards, &CallbackGuard::upper_bound)) {
             table.upper_bound = &bound<&CallbackGuard::upper_bound>;
         }
     }

@@ -75,6 +75,20 @@ CallbackSource::CallbackSource(PyObject* specification)
     if (!PyDict_Check(specification)) {
         raise(PyExc_TypeError, "found a " + type_of(specification) + ", expected a dictionary");
     }
+    read_functions(specification);
+    read_arguments(specification);
+    read_modes(specification);
+    read_guards(specification);
+    if (const Ref inclusion = item(specification, "set_valued"); inclusion.get() != Py_None) {
+        read_inclusion(inclusion.get());
+    }
+    free_ = needs_no_interpreter();
+    table_.changes_dimension = truth_in(specification, "changes_dimension");
+    fill_table();
+}
+
+void CallbackSource::read_functions(PyObject* specification)
+{
     const auto function = [&](const char* key) {
         return Function(item(specification, key).get(), key);
     };
@@ -96,69 +110,74 @@ CallbackSource::CallbackSource(PyObject* specification)
     if (const Ref times = item(specification, "time_events"); times.get() != Py_None) {
         times_ = pybind11::handle(times.get()).cast<Times>();
     }
+}
 
+void CallbackSource::read_arguments(PyObject* specification)
+{
     const Ref arguments = item(specification, "args");
-    if (arguments.get() != Py_None) {
-        const Ref sequence =
-            checked(PySequence_Fast(arguments.get(), "args: expected a tuple or a list"));
-        const Py_ssize_t count = PySequence_Fast_GET_SIZE(sequence.get());
-        if (count > static_cast<Py_ssize_t>(most_arguments) - 8) {
-            raise(PyExc_ValueError,
-                  "args: found " + std::to_string(count) + " arguments, expected at most 24");
-        }
-        for (Py_ssize_t i = 0; i < count; ++i) {
-            arguments_.push_back(Ref::share(PySequence_Fast_GET_ITEM(sequence.get(), i)));
-        }
+    if (arguments.get() == Py_None) return;
+    const Ref sequence =
+        checked(PySequence_Fast(arguments.get(), "args: expected a tuple or a list"));
+    const Py_ssize_t count = PySequence_Fast_GET_SIZE(sequence.get());
+    if (count > static_cast<Py_ssize_t>(most_arguments) - 8) {
+        raise(PyExc_ValueError,
+              "args: found " + std::to_string(count) + " arguments, expected at most 24");
     }
+    for (Py_ssize_t i = 0; i < count; ++i) {
+        arguments_.push_back(Ref::share(PySequence_Fast_GET_ITEM(sequence.get(), i)));
+    }
+}
 
+void CallbackSource::read_modes(PyObject* specification)
+{
     mode_list_ = item(specification, "modes");
     moded_ = mode_list_.get() != Py_None;
-    if (moded_) {
-        mode_count_ = static_cast<std::size_t>(PyList_GET_SIZE(mode_list_.get()));
-        if (mode_count_ == 0) raise(PyExc_ValueError, "modes: found none, expected at least one");
-        mode_numbers_ = checked(PyDict_New());
-        for (std::size_t i = 0; i < mode_count_; ++i) {
-            const Ref number = checked(PyLong_FromSize_t(i));
-            if (PyDict_SetItem(mode_numbers_.get(),
-                               PyList_GET_ITEM(mode_list_.get(), static_cast<Py_ssize_t>(i)),
-                               number.get()) != 0) {
-                throw PythonError();
-            }
-        }
-        if (PyDict_Size(mode_numbers_.get()) != PyList_GET_SIZE(mode_list_.get())) {
-            const Ref text = checked(PyObject_Repr(mode_list_.get()));
-            raise(PyExc_ValueError, std::string("modes: found ") + PyUnicode_AsUTF8(text.get()) +
-                                        ", expected each of them once");
-        }
-    } else {
+    if (!moded_) {
         mode_list_ = Ref();
+        return;
     }
-
-    const Ref guards = item(specification, "guards");
-    if (guards.get() != Py_None) {
-        const auto count = static_cast<std::size_t>(PyList_GET_SIZE(guards.get()));
-        guards_.reserve(count);  // pointers to the names must stay valid
-        for (std::size_t i = 0; i < count; ++i) {
-            read_guard(PyList_GET_ITEM(guards.get(), static_cast<Py_ssize_t>(i)));
+    mode_count_ = static_cast<std::size_t>(PyList_GET_SIZE(mode_list_.get()));
+    if (mode_count_ == 0) raise(PyExc_ValueError, "modes: found none, expected at least one");
+    mode_numbers_ = checked(PyDict_New());
+    for (std::size_t i = 0; i < mode_count_; ++i) {
+        const Ref number = checked(PyLong_FromSize_t(i));
+        if (PyDict_SetItem(mode_numbers_.get(),
+                           PyList_GET_ITEM(mode_list_.get(), static_cast<Py_ssize_t>(i)),
+                           number.get()) != 0) {
+            throw PythonError();
         }
     }
-
-    if (const Ref inclusion = item(specification, "set_valued"); inclusion.get() != Py_None) {
-        read_inclusion(inclusion.get());
+    if (PyDict_Size(mode_numbers_.get()) != PyList_GET_SIZE(mode_list_.get())) {
+        const Ref text = checked(PyObject_Repr(mode_list_.get()));
+        raise(PyExc_ValueError, std::string("modes: found ") + PyUnicode_AsUTF8(text.get()) +
+                                    ", expected each of them once");
     }
+}
 
+void CallbackSource::read_guards(PyObject* specification)
+{
+    const Ref guards = item(specification, "guards");
+    if (guards.get() == Py_None) return;
+    const auto count = static_cast<std::size_t>(PyList_GET_SIZE(guards.get()));
+    guards_.reserve(count);  // pointers to the names must stay valid
+    for (std::size_t i = 0; i < count; ++i) {
+        read_guard(PyList_GET_ITEM(guards.get(), static_cast<Py_ssize_t>(i)));
+    }
+}
+
+bool CallbackSource::needs_no_interpreter() const
+{
     const auto is_free = [](const Function& f) { return !f || f.address; };
-    free_ = is_free(flow_) && is_free(jacobian_) && !guard_values_ && !reset_set_ &&
-            !next_time_event_ && !next_time_event_at_ && !previous_time_event_ &&
-            is_free(time_reset_) && !inclusion_;
+    bool free = is_free(flow_) && is_free(jacobian_) && !guard_values_ && !reset_set_ &&
+                !next_time_event_ && !next_time_event_at_ && !previous_time_event_ &&
+                is_free(time_reset_) && !inclusion_;
     for (const CallbackGuard& guard : guards_) {
-        free_ = free_ && is_free(guard.value) && is_free(guard.rate) && is_free(guard.reset) &&
-                is_free(guard.rest) && !guard.enabled && is_free(guard.speed_bound) &&
-                is_free(guard.acceleration_bound) && is_free(guard.lower_bound) &&
-                is_free(guard.upper_bound);
+        free = free && is_free(guard.value) && is_free(guard.rate) && is_free(guard.reset) &&
+               is_free(guard.rest) && !guard.enabled && is_free(guard.speed_bound) &&
+               is_free(guard.acceleration_bound) && is_free(guard.lower_bound) &&
+               is_free(guard.upper_bound);
     }
-    table_.changes_dimension = truth_in(specification, "changes_dimension");
-    fill_table();
+    return free;
 }
 
 void CallbackSource::read_guard(PyObject* specification)

@@ -86,11 +86,17 @@ public:
 private:
     friend class CallbackDoor;
 
+    void read_functions(PyObject* specification);
+    void read_arguments(PyObject* specification);
+    void read_modes(PyObject* specification);
+    void read_guards(PyObject* specification);
     void read_guard(PyObject* specification);
     void read_inclusion(PyObject* specification);
     /// Whether each mode is among those that a specification names; empty if it names none.
     [[nodiscard]] std::vector<bool> modes_in(PyObject* specification,
                                              const std::string& title) const;
+    /// Whether no function that a run calls needs the interpreter.
+    [[nodiscard]] bool needs_no_interpreter() const;
     void fill_table();
     /// The guards as formulas; nothing if one of them is none.
     [[nodiscard]] std::optional<std::vector<const ModedFormula*>> guard_formulas() const;

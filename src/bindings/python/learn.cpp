@@ -403,82 +403,53 @@ private:
     }
 }
 
-py::object certify(const py::bytes& content, const std::shared_ptr<Source>& source,
-                   const py::object& slack, const py::object& least, const py::dict& given,
-                   const py::object& progress, const py::function& wrap)
+/// @throws std::invalid_argument or value_error for a model of another system
+void check_certifiable(const Model& model, const DoorSystem& system)
 {
-    CertifyOptions options;
-    read(options, given, certify_options());
-    const std::string_view text = content;
-    const Model model =
-        parse_model(std::as_bytes(std::span(text.data(), text.size())), "the network");
-    const std::size_t n = model.domain.size();
-    Doors doors(*source, State(n));
-    doors.with([&](const DoorSystem& system) {
-        if (system.guard_count() == 0) {
-            throw py::value_error("certify: found a system without guards, expected at least one");
-        }
-        learn::detail::check_certifiable(model, system.name, n);
-        for (const auto& [name, trained] : model.parameters) {
-            learn::detail::check_parameter(name, trained, system.parameter(name));
-        }
-        return 0;
-    });
-
-    Background<learn::CertifyProgress> background(
-        progress.is_none() ? Background<learn::CertifyProgress>::Show{}
-                           : [&progress](const learn::CertifyProgress& now) {
-                                 using namespace py::literals;
-                                 const py::object goes_on =
-                                     progress("stage"_a = "proving", "level"_a = now.level,
-                                              "levels"_a = now.levels, "margin"_a = now.margin,
-                                              "threshold"_a = now.threshold, "boxes"_a = now.boxes,
-                                              "share"_a = now.share, "seconds"_a = now.seconds,
-                                              "seconds_left"_a = now.seconds_left);
-                                 return !goes_on.is(py::bool_(false));
-                             });
-    const auto unless_stopped = [&](const auto& evaluate) {
-        if (background.stopped()) throw learn::CertifyInterrupted{};
-        return evaluate();
-    };
-    learn::GuardProblem problem;
-    problem.guard = [&](const double* x) {
-        return unless_stopped([&] {
-            return doors.with(
-                [&](const DoorSystem& system) { return system.guard(0, 0, 0.0, State(x, x + n)); });
-        });
-    };
-    std::vector<double> constants;
-    if (PyCallable_Check(slack.ptr())) {
-        problem.slack = [&](const double* h) {
-            return unless_stopped([&] { return number_from(slack, "slack", n, h, nullptr); });
-        };
-    } else {
-        constants = py::cast<std::vector<double>>(slack);
-        if (constants.size() != n) {
-            throw py::value_error("slack: found " + std::to_string(constants.size()) +
-                                  " numbers, expected " + std::to_string(n));
-        }
-        for (const double l : constants) {
-            if (!(l >= 0)) throw py::value_error("slack: found a number that is negative or NaN");
-        }
-        problem.slack = [&](const double* h) {
-            double sum = 0;
-            for (std::size_t i = 0; i < n; ++i) sum += constants[i] * h[i];
-            return sum;
-        };
+    if (system.guard_count() == 0) {
+        throw py::value_error("certify: found a system without guards, expected at least one");
     }
-    if (!least.is_none()) {
-        problem.least = [&](const double* lower, const double* upper) {
-            return unless_stopped([&] { return number_from(least, "least", n, lower, upper); });
-        };
+    learn::detail::check_certifiable(model, system.name, model.domain.size());
+    for (const auto& [name, trained] : model.parameters) {
+        learn::detail::check_parameter(name, trained, system.parameter(name));
     }
+}
 
-    learn::CertifiedModel certified;
-    background.run([&] {
-        certified = learn::certify(model, problem, options,
-                                   [&](const auto& now) { return background.report(now); });
-    });
+[[nodiscard]] Background<learn::CertifyProgress>::Show shower_of_proof(const py::object& progress)
+{
+    if (progress.is_none()) return {};
+    return [&progress](const learn::CertifyProgress& now) {
+        using namespace py::literals;
+        const py::object goes_on = progress(
+            "stage"_a = "proving", "level"_a = now.level, "levels"_a = now.levels,
+            "margin"_a = now.margin, "threshold"_a = now.threshold, "boxes"_a = now.boxes,
+            "share"_a = now.share, "seconds"_a = now.seconds, "seconds_left"_a = now.seconds_left);
+        return !goes_on.is(py::bool_(false));
+    };
+}
+
+/// The slack of a guard by constants, the sum of l_i h_i, from n numbers.
+[[nodiscard]] std::function<double(const double*)> constant_slack(const py::object& given,
+                                                                  std::size_t n)
+{
+    auto constants = py::cast<std::vector<double>>(given);
+    if (constants.size() != n) {
+        throw py::value_error("slack: found " + std::to_string(constants.size()) +
+                              " numbers, expected " + std::to_string(n));
+    }
+    for (const double l : constants) {
+        if (!(l >= 0)) throw py::value_error("slack: found a number that is negative or NaN");
+    }
+    return [constants = std::move(constants)](const double* h) {
+        double sum = 0;
+        for (std::size_t i = 0; i < constants.size(); ++i) sum += constants[i] * h[i];
+        return sum;
+    };
+}
+
+/// The levels, estimates and outcome of a certification, and the bytes of the model.
+[[nodiscard]] py::dict summary_of(learn::CertifiedModel& certified, const Source& source)
+{
     using namespace py::literals;
     py::list levels;
     for (std::size_t i = 0; i < certified.report.levels.size(); ++i) {
@@ -492,15 +463,61 @@ py::object certify(const py::bytes& content, const std::shared_ptr<Source>& sour
         estimates.append(py::dict("boxes"_a = e.boxes, "seconds"_a = e.seconds,
                                   "unproved"_a = e.unproved, "error"_a = e.error));
     }
-    return handed_back(
-        background,
-        py::dict("content"_a = bytes_of(std::move(certified.model), *source),
-                 "proved"_a = certified.proved(),
-                 "outcome"_a = static_cast<int>(certified.report.outcome),
-                 "outcome_text"_a = describe(certified.report), "levels"_a = levels,
-                 "estimates"_a = estimates, "counterexample"_a = certified.report.counterexample,
-                 "seconds"_a = certified.report.seconds),
-        wrap);
+    return py::dict("content"_a = bytes_of(std::move(certified.model), source),
+                    "proved"_a = certified.proved(),
+                    "outcome"_a = static_cast<int>(certified.report.outcome),
+                    "outcome_text"_a = describe(certified.report), "levels"_a = levels,
+                    "estimates"_a = estimates, "counterexample"_a = certified.report.counterexample,
+                    "seconds"_a = certified.report.seconds);
+}
+
+py::object certify(const py::bytes& content, const std::shared_ptr<Source>& source,
+                   const py::object& slack, const py::object& least, const py::dict& given,
+                   const py::object& progress, const py::function& wrap)
+{
+    CertifyOptions options;
+    read(options, given, certify_options());
+    const std::string_view text = content;
+    const Model model =
+        parse_model(std::as_bytes(std::span(text.data(), text.size())), "the network");
+    const std::size_t n = model.domain.size();
+    Doors doors(*source, State(n));
+    doors.with([&](const DoorSystem& system) {
+        check_certifiable(model, system);
+        return 0;
+    });
+
+    Background<learn::CertifyProgress> background(shower_of_proof(progress));
+    const auto unless_stopped = [&](const auto& evaluate) {
+        if (background.stopped()) throw learn::CertifyInterrupted{};
+        return evaluate();
+    };
+    learn::GuardProblem problem;
+    problem.guard = [&](const double* x) {
+        return unless_stopped([&] {
+            return doors.with(
+                [&](const DoorSystem& system) { return system.guard(0, 0, 0.0, State(x, x + n)); });
+        });
+    };
+    if (PyCallable_Check(slack.ptr())) {
+        problem.slack = [&](const double* h) {
+            return unless_stopped([&] { return number_from(slack, "slack", n, h, nullptr); });
+        };
+    } else {
+        problem.slack = constant_slack(slack, n);
+    }
+    if (!least.is_none()) {
+        problem.least = [&](const double* lower, const double* upper) {
+            return unless_stopped([&] { return number_from(least, "least", n, lower, upper); });
+        };
+    }
+
+    learn::CertifiedModel certified;
+    background.run([&] {
+        certified = learn::certify(model, problem, options,
+                                   [&](const auto& now) { return background.report(now); });
+    });
+    return handed_back(background, summary_of(certified, *source), wrap);
 }
 
 }  // namespace

@@ -142,26 +142,24 @@ private:
                     "steps"_a = c.steps, "seed"_a = c.seed);
 }
 
-}  // namespace
+using NetworkClass = py::class_<PyNetwork>;
 
-void bind_network(py::module_& module)
+[[nodiscard]] Rows rows(const PyNetwork& self, const Features& features)
 {
-    const auto rows = [](const PyNetwork& self, const Features& features) {
-        return Rows(features, self.classifier().inputs());
-    };
-    const auto meta = [](auto member) {
-        return [member](const PyNetwork& self) { return (*self.model()).*member; };
-    };
-    py::class_<PyNetwork>(module, "Network")
-        .def(py::init(&network_from))
-        .def(py::init<const PyNetwork&>())
+    return Rows(features, self.classifier().inputs());
+}
+
+/// Binds what a network says about features.
+void bind_answers(NetworkClass& network)
+{
+    network
         .def("__call__",
-             [rows](const PyNetwork& self, const Features& features) {
+             [](const PyNetwork& self, const Features& features) {
                  return rows(self, features).logits(self.classifier());
              })
         .def(
             "alarm",
-            [rows](const PyNetwork& self, const Features& features) {
+            [](const PyNetwork& self, const Features& features) {
                 const Classifier& c = self.classifier();
                 return rows(self, features).template answers<bool>([&](const double* x) {
                     return c.alarm(c.logit(x));
@@ -170,7 +168,7 @@ void bind_network(py::module_& module)
             "Whether an event is announced: the first output is not below the threshold.")
         .def(
             "in_domain",
-            [rows](const PyNetwork& self, const Features& features) {
+            [](const PyNetwork& self, const Features& features) {
                 const Classifier& c = self.classifier();
                 return rows(self, features).template answers<bool>([&](const double* x) {
                     return c.in_domain(x);
@@ -179,7 +177,7 @@ void bind_network(py::module_& module)
             "Whether the features lie in the box that the network was trained for.")
         .def(
             "cleared",
-            [rows](const PyNetwork& self, const Features& features) {
+            [](const PyNetwork& self, const Features& features) {
                 const auto* const gate = self.gate();
                 const auto* const certified = self.certified();
                 if (!gate && !certified) {
@@ -194,9 +192,16 @@ void bind_network(py::module_& module)
             },
             "Of a gate the largest horizon or level that it clears, 0 where it clears none; with a "
             "certificate the largest margin that the guard is proved to be above, -inf where it is "
-            "above none.")
-        .def("to_bytes", &bytes_of_file, "The bytes of its file.")
-        .def_property_readonly("kind", meta(&Model::kind), "What it is, e.g. 'gate-horizon'.")
+            "above none.");
+}
+
+/// Binds what a network is for, and what is known about it.
+void bind_metadata(NetworkClass& network)
+{
+    const auto meta = [](auto member) {
+        return [member](const PyNetwork& self) { return (*self.model()).*member; };
+    };
+    network.def_property_readonly("kind", meta(&Model::kind), "What it is, e.g. 'gate-horizon'.")
         .def_property_readonly("system", meta(&Model::system), "The name of its system.")
         .def_property_readonly("parameters", meta(&Model::parameters),
                                "The parameters of the system that it depends on.")
@@ -205,6 +210,28 @@ void bind_network(py::module_& module)
         .def_property_readonly("threshold", meta(&Model::threshold),
                                "An event is predicted where the output is not below it.")
         .def_property_readonly("seed", meta(&Model::seed), "The seed of its training.")
+        .def_property_readonly(
+            "step_range",
+            [](const PyNetwork& self) {
+                return std::pair(self.model()->step_min, self.model()->step_max);
+            },
+            "The smallest and the largest step that it was trained for.")
+        .def_property_readonly(
+            "levels", [](const PyNetwork& self) { return levels_of(*self.model()); },
+            "Of a gate a tuple (value, threshold) for each level.")
+        .def_property_readonly(
+            "calibration", [](const PyNetwork& self) { return calibration_of(*self.model()); },
+            "Misses of a gate on runs that it was not made from, as a dictionary, or "
+            "None.")
+        .def_property_readonly(
+            "certified", [](const PyNetwork& self) { return self.certified() != nullptr; },
+            "Whether it has a certificate that holds.");
+}
+
+/// Binds the numbers from which a network computes its outputs.
+void bind_layers(NetworkClass& network)
+{
+    network
         .def_property_readonly(
             "activation",
             [](const PyNetwork& self) { return std::string(name(self.model()->activation)); },
@@ -215,12 +242,6 @@ void bind_network(py::module_& module)
                 return self.model()->precision == Precision::f32 ? "f32" : "f64";
             },
             "How its weights are stored and evaluated.")
-        .def_property_readonly(
-            "step_range",
-            [](const PyNetwork& self) {
-                return std::pair(self.model()->step_min, self.model()->step_max);
-            },
-            "The smallest and the largest step that it was trained for.")
         .def_property_readonly(
             "domain", [](const PyNetwork& self) { return pairs(self.model()->domain); },
             "The box that it was trained in, a row (lower, upper) for each feature.")
@@ -245,17 +266,20 @@ void bind_network(py::module_& module)
                 const auto& scale = model_of(self).scale;
                 return view_of(scale.data(), {static_cast<py::ssize_t>(scale.size())}, self);
             },
-            "What they are multiplied with then.")
-        .def_property_readonly(
-            "levels", [](const PyNetwork& self) { return levels_of(*self.model()); },
-            "Of a gate a tuple (value, threshold) for each level.")
-        .def_property_readonly(
-            "calibration", [](const PyNetwork& self) { return calibration_of(*self.model()); },
-            "Misses of a gate on runs that it was not made from, as a dictionary, or "
-            "None.")
-        .def_property_readonly(
-            "certified", [](const PyNetwork& self) { return self.certified() != nullptr; },
-            "Whether it has a certificate that holds.");
+            "What they are multiplied with then.");
+}
+
+}  // namespace
+
+void bind_network(py::module_& module)
+{
+    NetworkClass network(module, "Network");
+    network.def(py::init(&network_from))
+        .def(py::init<const PyNetwork&>())
+        .def("to_bytes", &bytes_of_file, "The bytes of its file.");
+    bind_answers(network);
+    bind_metadata(network);
+    bind_layers(network);
 }
 
 }  // namespace ricochet::python

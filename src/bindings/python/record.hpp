@@ -90,6 +90,50 @@ void put_state(const X& x, std::size_t width, double* out)
     return width;
 }
 
+[[nodiscard]] inline std::int64_t signed_guard(std::size_t guard) noexcept
+{
+    return static_cast<std::int64_t>(guard);
+}
+
+/// Writes the events with their states, which are not wider than `out.width`.
+template <class X>
+void put_events(const std::vector<Event<X>>& events, Record& out)
+{
+    out.event_count = events.size();
+    out.events.resize(out.event_count * out.event_stride());
+    double* at = out.events.data();
+    for (const Event<X>& event : events) {
+        const EventHead head{.t = event.t,
+                             .guard = signed_guard(event.guard),
+                             .bracket = {event.bracket.lo, event.bracket.hi},
+                             .slope = event.slope,
+                             .error = event.error,
+                             .mode_before = event.mode_before,
+                             .mode_after = event.mode_after,
+                             .kind = static_cast<std::uint8_t>(event.kind),
+                             .late = event.late,
+                             .unused = {},
+                             .reaction = static_cast<std::int32_t>(event.reaction)};
+        std::memcpy(at, &head, sizeof head);
+        double* states = at + sizeof(EventHead) / sizeof(double);
+        put_state(event.before, out.width, states);
+        put_state(event.after, out.width, states + out.width);
+        at += out.event_stride();
+    }
+}
+
+/// A sentence about a bound that a guard has broken.
+template <class X>
+[[nodiscard]] std::string text_of(const WrongBound<X>& wrong)
+{
+    return "at t = " + std::to_string(wrong.t) + " the guard is " + std::to_string(wrong.value) +
+           ", and " +
+           (wrong.lower_bound   ? "its lower bound "
+            : wrong.upper_bound ? "its upper bound "
+                                : "it may have changed by ") +
+           std::to_string(wrong.allowed);
+}
+
 /// @param steps  ends of steps, if they are to be kept; null: the samples of the trajectory are
 /// used
 template <class X>
@@ -97,7 +141,6 @@ template <class X>
 {
     Record out;
     const Trajectory<X>& kept = steps ? steps->states : run.trajectory;
-    const auto signed_guard = [](std::size_t guard) { return static_cast<std::int64_t>(guard); };
     out.outcome = run.outcome;
     out.t = run.t;
     out.width = run.x.size();
@@ -116,27 +159,7 @@ template <class X>
     out.phases = run.phases;
     out.reaction = run.reaction;
     out.reaction_width = put_rows(steps ? steps->reactions : run.reactions, out.reactions);
-    out.event_count = run.events.size();
-    out.events.resize(out.event_count * out.event_stride());
-    double* at = out.events.data();
-    for (const Event<X>& event : run.events) {
-        const EventHead head{.t = event.t,
-                             .guard = signed_guard(event.guard),
-                             .bracket = {event.bracket.lo, event.bracket.hi},
-                             .slope = event.slope,
-                             .error = event.error,
-                             .mode_before = event.mode_before,
-                             .mode_after = event.mode_after,
-                             .kind = static_cast<std::uint8_t>(event.kind),
-                             .late = event.late,
-                             .unused = {},
-                             .reaction = static_cast<std::int32_t>(event.reaction)};
-        std::memcpy(at, &head, sizeof head);
-        double* states = at + sizeof(EventHead) / sizeof(double);
-        put_state(event.before, out.width, states);
-        put_state(event.after, out.width, states + out.width);
-        at += out.event_stride();
-    }
+    put_events(run.events, out);
     out.times = kept.t;
     out.states.resize(kept.x.size() * out.width);
     for (std::size_t i = 0; i < kept.x.size(); ++i) {
@@ -147,15 +170,7 @@ template <class X>
             out.solution = std::make_shared<Solution<State>>(std::move(run.solution));
         }
     }
-    if (run.wrong_bound) {
-        const auto& wrong = *run.wrong_bound;
-        out.wrong_bound = "at t = " + std::to_string(wrong.t) + " the guard is " +
-                          std::to_string(wrong.value) + ", and " +
-                          (wrong.lower_bound   ? "its lower bound "
-                           : wrong.upper_bound ? "its upper bound "
-                                               : "it may have changed by ") +
-                          std::to_string(wrong.allowed);
-    }
+    if (run.wrong_bound) out.wrong_bound = text_of(*run.wrong_bound);
     return out;
 }
 

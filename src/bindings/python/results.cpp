@@ -264,7 +264,48 @@ py::object modes_of(const Source& source, const py::object& given)
     return names.empty() ? py::object(py::none()) : py::object(py::cast(names));
 }
 
-void bind_results(py::module_& module)
+namespace {
+
+/// A sentence about the outcome, with the names that Python has for functions and guards.
+[[nodiscard]] std::string message_of(const PyRun& self)
+{
+    const Record& r = self.record;
+    std::string out = detail::describe_run(r.outcome, r.reason, {}, {});
+    const bool conflicts = r.outcome == Outcome::conflicting_resets;
+    if (conflicts) {
+        constexpr std::string_view in_cpp = "reset(fired, t, x)";
+        if (const auto at = out.find(in_cpp); at != std::string::npos) {
+            out.replace(at, in_cpp.size(), "reset_set(t, x, fired)");
+        }
+    }
+    const bool in_turn = r.outcome == Outcome::zeno && r.other_guard >= 0;
+    if (conflicts || in_turn) {
+        const auto named = [&](std::int64_t guard) {
+            const auto which = static_cast<std::size_t>(guard);
+            return which < self.guard_names.size() ? self.guard_names[which] : "a time event";
+        };
+        out += ": " + named(r.guard) + ", " + named(r.other_guard);
+    }
+    if (!r.wrong_bound.empty()) out += ": " + r.wrong_bound;
+    const std::vector<std::size_t>& on = r.armed_on_surface;
+    const auto add = [&](bool on_surface, std::string_view before) {
+        for (const std::size_t which : r.armed_beyond) {
+            if (std::binary_search(on.begin(), on.end(), which) != on_surface) continue;
+            out += std::string(std::exchange(before, ", ")) + self.guard_names.at(which);
+        }
+    };
+    add(false,
+        "; began beyond their surface, and waited until they had returned (at_start "
+        "and at_entry let them fire there): ");
+    add(true,
+        "; began on their surface and moved on beyond it, which is no event "
+        "(unilateral and at_start give them one; a start from what a run has left at "
+        "rest is held again by continues): ");
+    const std::string more = describe(r.statistics, self.guard_names);
+    return more.empty() ? out : out + "; " + more;
+}
+
+void bind_solution(py::module_& module)
 {
     py::class_<PySolution, std::shared_ptr<PySolution>>(
         module, "Solution",
@@ -308,91 +349,29 @@ void bind_results(py::module_& module)
             "The later end of the solution.")
         .def(py::pickle([](const PySolution& self) { return pickled(self); },
                         [](const py::tuple& state) { return solution_from(state); }));
+}
 
-    const auto self_of = [](const py::object& self) -> const PyRun& {
-        return py::cast<const PyRun&>(self);
-    };
-    py::class_<PyRun, std::shared_ptr<PyRun>>(
-        module, "Run", "What a run has computed; its arrays are views of it.")
-        .def("__repr__",
-             [](const PyRun& self) {
-                 return "<Run: " + std::string(name(self.record.outcome)) +
-                        " at t = " + py::str(py::float_(self.record.t)).cast<std::string>() + ", " +
-                        std::to_string(self.record.statistics.events) + " events>";
-             })
+using RunClass = py::class_<PyRun, std::shared_ptr<PyRun>>;
+
+[[nodiscard]] const Record& record_in(const py::object& self)
+{
+    return py::cast<const PyRun&>(self).record;
+}
+
+/// The outcome, and where the run ended.
+void bind_end(RunClass& run)
+{
+    run.def_property_readonly(
+           "outcome", [](const PyRun& self) { return std::string(name(self.record.outcome)); },
+           "How the run ended, e.g. 'reached_end' or 'zeno'.")
         .def_property_readonly(
-            "outcome", [](const PyRun& self) { return std::string(name(self.record.outcome)); },
-            "How the run ended, e.g. 'reached_end' or 'zeno'.")
-        .def_property_readonly(
-            "message",
-            [](const PyRun& self) {
-                std::string out =
-                    detail::describe_run(self.record.outcome, self.record.reason, {}, {});
-                const bool conflicts = self.record.outcome == Outcome::conflicting_resets;
-                if (conflicts) {
-                    constexpr std::string_view in_cpp = "reset(fired, t, x)";
-                    if (const auto at = out.find(in_cpp); at != std::string::npos) {
-                        out.replace(at, in_cpp.size(), "reset_set(t, x, fired)");
-                    }
-                }
-                const bool in_turn =
-                    self.record.outcome == Outcome::zeno && self.record.other_guard >= 0;
-                if (conflicts || in_turn) {
-                    const auto named = [&](std::int64_t guard) {
-                        const auto which = static_cast<std::size_t>(guard);
-                        return which < self.guard_names.size() ? self.guard_names[which]
-                                                               : "a time event";
-                    };
-                    out += ": " + named(self.record.guard) + ", " + named(self.record.other_guard);
-                }
-                if (!self.record.wrong_bound.empty()) out += ": " + self.record.wrong_bound;
-                const std::vector<std::size_t>& on = self.record.armed_on_surface;
-                const auto add = [&](bool on_surface, std::string_view before) {
-                    for (const std::size_t which : self.record.armed_beyond) {
-                        if (std::binary_search(on.begin(), on.end(), which) != on_surface) continue;
-                        out +=
-                            std::string(std::exchange(before, ", ")) + self.guard_names.at(which);
-                    }
-                };
-                add(false,
-                    "; began beyond their surface, and waited until they had returned (at_start "
-                    "and at_entry let them fire there): ");
-                add(true,
-                    "; began on their surface and moved on beyond it, which is no event "
-                    "(unilateral and at_start give them one; a start from what a run has left at "
-                    "rest is held again by continues): ");
-                const std::string more = describe(self.record.statistics, self.guard_names);
-                return more.empty() ? out : out + "; " + more;
-            },
+            "message", &message_of,
             "A sentence about the outcome, about guards that began beyond their surface, and on "
             "resets that declined.")
         .def_property_readonly(
             "reason", [](const PyRun& self) { return self.record.reason; },
             "The text of the `Stop` that ended the run, a sentence about reactions that did, the "
             "function that was not finite, or an empty text.")
-        .def_property_readonly(
-            "phases", [](const PyRun& self) { return listed(self.record.phases); },
-            "Of a system with set_valued: tuples of the time from which a phase lasts, whether "
-            "something is held or followed by implicit steps in it, and why it began.")
-        .def_property_readonly(
-            "reaction",
-            [self_of](const py::object& self) {
-                const Record& r = self_of(self).record;
-                return view_of(r.reaction.data(), {static_cast<py::ssize_t>(r.reaction.size())},
-                               self);
-            },
-            "Of a system with set_valued: the reactions at the end, after its events; empty where "
-            "the mode has no inclusion, NaN where none follows from the state.")
-        .def_property_readonly(
-            "reactions",
-            [self_of](const py::object& self) {
-                const Record& r = self_of(self).record;
-                return view_of(r.reactions.data(),
-                               {static_cast<py::ssize_t>(r.times.size()),
-                                static_cast<py::ssize_t>(r.reaction_width)},
-                               self);
-            },
-            "The same at `times`, in rows; NaN in modes without an inclusion.")
         .def_property_readonly(
             "success",
             [](const PyRun& self) {
@@ -404,8 +383,8 @@ void bind_results(py::module_& module)
             "t", [](const PyRun& self) { return self.record.t; }, "The time reached.")
         .def_property_readonly(
             "x",
-            [self_of](const py::object& self) {
-                const Record& r = self_of(self).record;
+            [](const py::object& self) {
+                const Record& r = record_in(self);
                 return view_of(r.x.data(), {static_cast<py::ssize_t>(r.x.size())}, self);
             },
             "The state at that time.")
@@ -429,15 +408,45 @@ void bind_results(py::module_& module)
             },
             "The guard of the second of two conflicting resets, -1 for a time event; another guard "
             "of "
-            "a cycle that accumulates; or None.")
-        .def_readonly("modes", &PyRun::modes, "What the modes are called, or None.")
-        .def_readonly("guard_names", &PyRun::guard_names, "What the guards are called.")
+            "a cycle that accumulates; or None.");
+}
+
+/// The phases and reactions of a system with set-valued motion.
+void bind_reactions(RunClass& run)
+{
+    run.def_property_readonly(
+           "phases", [](const PyRun& self) { return listed(self.record.phases); },
+           "Of a system with set_valued: tuples of the time from which a phase lasts, whether "
+           "something is held or followed by implicit steps in it, and why it began.")
         .def_property_readonly(
-            "statistics", [](const PyRun& self) { return statistics_of(self.record); },
-            "What the run did, counted; its evidence says why steps were taken to hold no event.")
+            "reaction",
+            [](const py::object& self) {
+                const Record& r = record_in(self);
+                return view_of(r.reaction.data(), {static_cast<py::ssize_t>(r.reaction.size())},
+                               self);
+            },
+            "Of a system with set_valued: the reactions at the end, after its events; empty where "
+            "the mode has no inclusion, NaN where none follows from the state.")
         .def_property_readonly(
-            "events",
-            [self_of](const py::object& self) { return events_of(self_of(self).record, self); },
+            "reactions",
+            [](const py::object& self) {
+                const Record& r = record_in(self);
+                return view_of(r.reactions.data(),
+                               {static_cast<py::ssize_t>(r.times.size()),
+                                static_cast<py::ssize_t>(r.reaction_width)},
+                               self);
+            },
+            "The same at `times`, in rows; NaN in modes without an inclusion.");
+}
+
+/// The events, the samples and the counts of the run.
+void bind_records(RunClass& run)
+{
+    run.def_property_readonly(
+           "statistics", [](const PyRun& self) { return statistics_of(self.record); },
+           "What the run did, counted; its evidence says why steps were taken to hold no event.")
+        .def_property_readonly(
+            "events", [](const py::object& self) { return events_of(record_in(self), self); },
             "The events, as a structured array with the fields t, guard, bracket, slope, error, "
             "mode_before, mode_after, kind, late, reaction, before, after.")
         .def_property_readonly(
@@ -456,15 +465,15 @@ void bind_results(py::module_& module)
             "The modes before and after each event, by name where the system names them.")
         .def_property_readonly(
             "times",
-            [self_of](const py::object& self) {
-                const Record& r = self_of(self).record;
+            [](const py::object& self) {
+                const Record& r = record_in(self);
                 return view_of(r.times.data(), {static_cast<py::ssize_t>(r.times.size())}, self);
             },
             "The times of `states`: sample times, or the ends of steps.")
         .def_property_readonly(
             "states",
-            [self_of](const py::object& self) {
-                const Record& r = self_of(self).record;
+            [](const py::object& self) {
+                const Record& r = record_in(self);
                 return view_of(
                     r.states.data(),
                     {static_cast<py::ssize_t>(r.times.size()), static_cast<py::ssize_t>(r.width)},
@@ -477,10 +486,29 @@ void bind_results(py::module_& module)
                 if (!self.record.solution) return py::none();
                 return py::cast(PySolution{self.record.solution, self.modes});
             },
-            "The solution at any time, or None where it was not kept.")
+            "The solution at any time, or None where it was not kept.");
+}
+
+void bind_run(py::module_& module)
+{
+    RunClass run(module, "Run", "What a run has computed; its arrays are views of it.");
+    run.def("__repr__",
+            [](const PyRun& self) {
+                return "<Run: " + std::string(name(self.record.outcome)) +
+                       " at t = " + py::str(py::float_(self.record.t)).cast<std::string>() + ", " +
+                       std::to_string(self.record.statistics.events) + " events>";
+            })
+        .def_readonly("modes", &PyRun::modes, "What the modes are called, or None.")
+        .def_readonly("guard_names", &PyRun::guard_names, "What the guards are called.")
         .def(py::pickle([](const PyRun& self) { return pickled(self); },
                         [](const py::tuple& state) { return run_from(state); }));
+    bind_end(run);
+    bind_reactions(run);
+    bind_records(run);
+}
 
+void bind_snapshot(py::module_& module)
+{
     py::class_<Snapshot>(module, "Snapshot", "A simulation, saved.")
         .def_property_readonly(
             "text", [](const Snapshot& self) { return to_text(self); },
@@ -491,6 +519,15 @@ void bind_results(py::module_& module)
         .def("__eq__", [](const Snapshot& self, const Snapshot& other) { return self == other; })
         .def(py::pickle([](const Snapshot& self) { return to_text(self); },
                         [](const std::string& text) { return snapshot_from_text(text); }));
+}
+
+}  // namespace
+
+void bind_results(py::module_& module)
+{
+    bind_solution(module);
+    bind_run(module);
+    bind_snapshot(module);
 }
 
 }  // namespace ricochet::python
