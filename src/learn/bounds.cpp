@@ -39,6 +39,74 @@ Pair magnitude(Pair x) noexcept
     return x < 0.0 ? -x : x;
 }
 
+/// The affine forms of four neurons: c, G_1 ... G_D, e, each by lane.
+template <std::size_t D>
+using FourForms = double[D + 2][lanes];
+
+/// Adds up the forms of the neurons before, times the weights of a block of four.
+template <std::size_t D>
+[[gnu::always_inline]] inline void add_up(const double* bias, const double* weights,
+                                          const double* forms, const std::size_t* active,
+                                          std::size_t count, FourForms<D>& sum) noexcept
+{
+    constexpr std::size_t stride = D + 2;
+    Pair sums[stride][2] = {};
+    sums[0][0] = load_pair(bias);
+    sums[0][1] = load_pair(bias + 2);
+    for (std::size_t a = 0; a < count; ++a) {
+        const double* const row = weights + active[a] * lanes;
+        const double* const form = forms + a * stride;
+        for (std::size_t p = 0; p < 2; ++p) {
+            const Pair w = load_pair(row + 2 * p);
+            for (std::size_t q = 0; q <= D; ++q) sums[q][p] += w * form[q];
+            sums[D + 1][p] += magnitude(w) * form[D + 1];
+        }
+    }
+    for (std::size_t q = 0; q < stride; ++q) {
+        for (std::size_t l = 0; l < lanes; ++l) sum[q][l] = sums[q][l / 2][l % 2];
+    }
+}
+
+/// One neuron before its activation: its form c + G t +- e without G, and what follows from it.
+struct Neuron {
+    double c, e;
+    double size;  ///< |c| + |G| 1 + e
+    double low, high;
+};
+
+/// @param own  twice the relative error of a sum over the layer before
+template <std::size_t D>
+[[gnu::always_inline]] inline Neuron neuron(const FourForms<D>& sum, std::size_t l, double bias,
+                                            double own) noexcept
+{
+    const double c = sum[0][l];
+    double reach = 0;
+    for (std::size_t q = 1; q <= D; ++q) reach += std::fabs(sum[q][l]);
+    const double e = sum[D + 1][l] * (1 + own) + own * std::fabs(bias) + underflow;
+    const double size = std::fabs(c) + reach + e;
+    const double pad = reach + e + own * size;
+    return {.c = c, .e = e, .size = size, .low = c - pad, .high = c + pad};
+}
+
+/// Writes the form of a neuron behind its ReLU, which is not always zero.
+/// @param next  twice the relative error of a sum over this layer
+template <std::size_t D>
+[[gnu::always_inline]] inline void activate(const Neuron& z, const FourForms<D>& sum, std::size_t l,
+                                            double own, double next, double* form) noexcept
+{
+    if (z.low >= 0) {
+        for (std::size_t q = 0; q <= D; ++q) form[q] = sum[q][l];
+        form[D + 1] = z.e + next * z.size;
+        return;
+    }
+    // slope z <= relu(z) <= slope z + 2 mu on [low, high], for any slope in [0, 1]
+    const double slope = z.high / (z.high - z.low);
+    const double mu = std::max(-slope * z.low, (1 - slope) * z.high) / 2 * (1 + own);
+    form[0] = slope * z.c + mu;
+    for (std::size_t q = 1; q <= D; ++q) form[q] = slope * sum[q][l];
+    form[D + 1] = slope * z.e + mu + (next + own) * (z.size + mu);
+}
+
 }  // namespace
 
 /// The normalised features of a box: |x - centre| <= radius.
@@ -168,13 +236,12 @@ NetworkBounds::Place NetworkBounds::place(const double* lower, const double* upp
     return at;
 }
 
-/// Fills `low` and `high` of every hidden layer, and gives the range of the logit.
+/// Writes the forms of the inputs.
 template <std::size_t D>
-ValueRange NetworkBounds::forward(const Place& at, Scratch& s, double* influence) const noexcept
+void NetworkBounds::start(const Place& at, Scratch& s) const noexcept
 {
     constexpr std::size_t stride = D + 2;  // c, G_1 ... G_D, e
-    std::size_t count = live_.size();
-    for (std::size_t a = 0; a < count; ++a) {
+    for (std::size_t a = 0; a < live_.size(); ++a) {
         double* const form = s.previous.data() + a * stride;
         std::fill_n(form, stride, 0.0);
         const std::size_t i = live_[a];
@@ -183,6 +250,14 @@ ValueRange NetworkBounds::forward(const Place& at, Scratch& s, double* influence
         form[D + 1] = gamma(layers_[0].inputs + D + 8) * (std::fabs(at.centre[i]) + at.radius[i]);
         s.active[a] = i;
     }
+}
+
+/// Fills `low` and `high` of every hidden layer, and gives the range of the logit.
+template <std::size_t D>
+ValueRange NetworkBounds::forward(const Place& at, Scratch& s, double* influence) const noexcept
+{
+    start<D>(at, s);
+    std::size_t count = live_.size();
     for (std::size_t k = 0; k < layers_.size(); ++k) {
         const Layer& layer = layers_[k];
         const bool last = k + 1 == layers_.size();
@@ -191,58 +266,26 @@ ValueRange NetworkBounds::forward(const Place& at, Scratch& s, double* influence
         double* to = s.forms.data();
         std::size_t kept = 0;
         for (std::size_t b = 0; b < layer.blocks; ++b) {
-            Pair sums[stride][2] = {};
-            sums[0][0] = load_pair(layer.bias.data() + b * lanes);
-            sums[0][1] = load_pair(layer.bias.data() + b * lanes + 2);
-            const double* const weights = layer.blocked.data() + b * layer.inputs * lanes;
-            for (std::size_t a = 0; a < count; ++a) {
-                const double* const row = weights + s.active[a] * lanes;
-                const double* const form = s.previous.data() + a * stride;
-                for (std::size_t p = 0; p < 2; ++p) {
-                    const Pair w = load_pair(row + 2 * p);
-                    for (std::size_t q = 0; q <= D; ++q) sums[q][p] += w * form[q];
-                    sums[D + 1][p] += magnitude(w) * form[D + 1];
-                }
-            }
-            double sum[stride][lanes];
-            for (std::size_t q = 0; q < stride; ++q) {
-                for (std::size_t l = 0; l < lanes; ++l) sum[q][l] = sums[q][l / 2][l % 2];
-            }
+            FourForms<D> sum;
+            add_up<D>(layer.bias.data() + b * lanes,
+                      layer.blocked.data() + b * layer.inputs * lanes, s.previous.data(),
+                      s.active.data(), count, sum);
             for (std::size_t l = 0; l < lanes && b * lanes + l < layer.outputs; ++l) {
                 const std::size_t j = b * lanes + l;
-                const double c = sum[0][l];
-                double reach = 0;
-                for (std::size_t q = 1; q <= D; ++q) reach += std::fabs(sum[q][l]);
-                const double e =
-                    sum[D + 1][l] * (1 + own) + own * std::fabs(layer.bias[j]) + underflow;
-                const double size = std::fabs(c) + reach + e;
-                const double pad = reach + e + own * size;
-                const double low = c - pad;
-                const double high = c + pad;
+                const Neuron z = neuron<D>(sum, l, layer.bias[j], own);
                 if (last) {
                     for (std::size_t i = 0; i < inputs_; ++i) influence[i] = 0;
                     for (std::size_t a = 0; a < live_.size(); ++a) {
                         influence[live_[a]] = std::fabs(sum[1 + a][l]);
                     }
-                    return {low, high};
+                    return {z.low, z.high};
                 }
-                s.low[k][j] = low;
-                s.high[k][j] = high;
-                if (high <= 0) continue;
+                s.low[k][j] = z.low;
+                s.high[k][j] = z.high;
+                if (z.high <= 0) continue;
                 s.next_active[kept] = j;
-                double* const form = to + kept * stride;
+                activate<D>(z, sum, l, own, next, to + kept * (D + 2));
                 ++kept;
-                if (low >= 0) {
-                    for (std::size_t q = 0; q <= D; ++q) form[q] = sum[q][l];
-                    form[D + 1] = e + next * size;
-                } else {
-                    // slope z <= relu(z) <= slope z + 2 mu on [low, high], for any slope in [0, 1]
-                    const double slope = high / (high - low);
-                    const double mu = std::max(-slope * low, (1 - slope) * high) / 2 * (1 + own);
-                    form[0] = slope * c + mu;
-                    for (std::size_t q = 1; q <= D; ++q) form[q] = slope * sum[q][l];
-                    form[D + 1] = slope * e + mu + (next + own) * (size + mu);
-                }
             }
         }
         count = kept;

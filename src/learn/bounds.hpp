@@ -92,6 +92,8 @@ private:
     void bound_evaluation(const Model& model);
     [[nodiscard]] Place place(const double* lower, const double* upper) const noexcept;
     template <std::size_t D>
+    void start(const Place& at, Scratch& s) const noexcept;
+    template <std::size_t D>
     [[nodiscard]] ValueRange forward(const Place& at, Scratch& s, double* influence) const noexcept;
     [[nodiscard]] ValueRange forward(const Place& at, Scratch& s, double* influence) const noexcept;
     [[nodiscard]] double backward(const Place& at, Scratch& s) const noexcept;

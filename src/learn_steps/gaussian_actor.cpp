@@ -158,6 +158,25 @@ void GaussianActor<T>::squash(std::size_t row, Work& work) const
     work.log_density[row] = log_density;
 }
 
+/// Writes the derivatives by m, n and v from those by a and by log p(a).
+template <class T>
+void GaussianActor<T>::unsquash(std::size_t row, const T* by_actions, T by_density, T* by_mean,
+                                Work& work) const
+{
+    for (std::size_t j = 0; j < actions(); ++j) {
+        const std::size_t i = row * stride() + j;
+        const T a = work.actions[i];
+        const T n = work.noise[i];
+        const T v = work.variance[i];
+        // -log(1 - tanh(u)^2) has the derivative 2 tanh(u).
+        const T by_u = by_actions[j] * (1 - a * a) + by_density * 2 * a;
+        const bool inside = std::abs(work.mean.values.back()[i]) < mean_bound;
+        by_mean[j] = inside ? by_u : T(0);
+        work.noise_slopes[i] = by_u - by_density * n / v;
+        work.variance_slopes[i] = by_density * (n * n / v - 1) / (2 * v);
+    }
+}
+
 template <class T>
 void GaussianActor<T>::backward(const Noise& noise, Rows<const T> states, std::size_t rows,
                                 Rows<const T> by_actions, T by_density, Work& work,
@@ -165,18 +184,7 @@ void GaussianActor<T>::backward(const Noise& noise, Rows<const T> states, std::s
 {
     const Rows<T> by_mean = mean_.slopes_out(work.mean);
     for (std::size_t row = 0; row < rows; ++row) {
-        for (std::size_t j = 0; j < actions(); ++j) {
-            const std::size_t i = row * stride() + j;
-            const T a = work.actions[i];
-            const T n = work.noise[i];
-            const T v = work.variance[i];
-            // -log(1 - tanh(u)^2) has the derivative 2 tanh(u).
-            const T by_u = by_actions.row(row)[j] * (1 - a * a) + by_density * 2 * a;
-            const bool inside = std::abs(work.mean.values.back()[i]) < mean_bound;
-            by_mean.row(row)[j] = inside ? by_u : T(0);
-            work.noise_slopes[i] = by_u - by_density * n / v;
-            work.variance_slopes[i] = by_density * (n * n / v - 1) / (2 * v);
-        }
+        unsquash(row, by_actions.row(row), by_density, by_mean.row(row), work);
     }
 
     const Rows<const T> h{work.trunk.values.back().data(), padded<T>(latent())};

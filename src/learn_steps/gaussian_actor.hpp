@@ -88,6 +88,7 @@ private:
     [[nodiscard]] std::size_t latent() const noexcept { return trunk_.outputs(); }
     [[nodiscard]] std::size_t stride() const noexcept { return padded<T>(actions()); }
     void squash(std::size_t row, Work& work) const;
+    void unsquash(std::size_t row, const T* by_actions, T by_density, T* by_mean, Work& work) const;
 
     BatchMlp<T> trunk_;
     BatchMlp<T> mean_;
