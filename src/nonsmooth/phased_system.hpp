@@ -826,7 +826,7 @@ void PhasedSystem<C>::add_time_events()
         };
     }
 }
-
+// Long: a list of functions, one for each entry of the table.
 template <class C>
 void PhasedSystem<C>::make_phases()
 {

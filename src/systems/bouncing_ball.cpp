@@ -47,6 +47,7 @@ double BouncingBall::zeno_time(double height, double velocity) const noexcept
            2 * speed / gravity_ * restitution_ / (1 - restitution_);
 }
 
+// Long: one list of what the system consists of.
 const SystemDescriptor& BouncingBall::descriptor()
 {
     using Numbers = std::span<const double>;

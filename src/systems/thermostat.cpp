@@ -33,6 +33,7 @@ double Thermostat::switch_time(int n, double temperature) const noexcept
         (cooling(temperature) + times_on * warming + times_off * cooling(p_.high)) / p_.rate);
 }
 
+// Long: one list of what the system consists of.
 const SystemDescriptor& Thermostat::descriptor()
 {
     using Numbers = std::span<const double>;

@@ -554,8 +554,8 @@ constexpr bool has_flow_alone()
     return true;
 }
 
-/// Refuses what does not fit, with a sentence for each. Returns true, so that a static_assert
-/// makes the compiler evaluate this check before any other.
+/// Refuses what does not fit. Returns true, so that a static_assert evaluates this check first.
+// Long: a list of members with a sentence for each, whose macro reads names of this function.
 template <class System, class X>
 constexpr bool check_declarations()
 {

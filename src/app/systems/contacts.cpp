@@ -69,6 +69,7 @@ SystemEntry incline_block_entry()
 
 // --- rolling ball ---
 
+// Long: one entry of the list of systems.
 SystemEntry rolling_ball_entry()
 {
     return {
@@ -141,6 +142,7 @@ SystemEntry rolling_ball_entry()
 
 // --- two contact block ---
 
+// Long: one entry of the list of systems.
 SystemEntry two_contact_block_entry()
 {
     return {

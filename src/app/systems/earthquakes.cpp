@@ -62,6 +62,7 @@ std::vector<Parameter> rate_state_parameters()
 
 }  // namespace
 
+// Long: one entry of the list of systems.
 SystemEntry fault_entry()
 {
     constexpr double inf = std::numeric_limits<double>::infinity();

@@ -11,6 +11,7 @@ namespace ricochet::app {
 
 // --- friction inclusion ---
 
+// Long: one entry of the list of systems.
 SystemEntry friction_inclusion_entry()
 {
     return {
@@ -177,6 +178,7 @@ SystemEntry super_twisting_entry()
 
 // --- diode circuit ---
 
+// Long: one entry of the list of systems.
 SystemEntry diode_circuit_entry()
 {
     return {

@@ -66,8 +66,8 @@ template <class System>
                                                                  : found;
 }
 
-/// Refuses what does not fit, with a sentence for each. Returns true, so that a static_assert
-/// makes the compiler evaluate this check before any other.
+/// Refuses what does not fit. Returns true, so that a static_assert evaluates this check first.
+// Long: a list of members with a sentence for each, whose macro reads names of this function.
 template <class System>
 constexpr bool check_inclusion()
 {

@@ -13,11 +13,11 @@
 namespace ricochet {
 
 /// The largest violation of "reaction in K and -y in the normal cone of K at the reaction" at
-/// (t, w), as a fraction of the forces: 0 where the law holds, and of the order of 1 where a
-/// reaction acts at the wrong bound. A y counts as zero below 1e-9 of its terms and of the change
-/// that the forces, and reactions at the nearer of their bounds or against y, cause in `span` [s],
-/// such as a step. For boxes each component is taken by itself; infinite where a set is empty. For
-/// a set of states it is 0, since the law is then the solver's residual.
+/// (t, w), as a fraction of the forces: 0 where the law holds, about 1 where a reaction acts at the
+/// wrong bound, infinite where a set is empty. A y is zero below 1e-9 of its terms and of what the
+/// forces, and reactions at the nearer of their bounds or against y, change it by in `span` [s].
+/// Boxes are measured by component; 0 for a set of states, where the solver has its own residual.
+// Long: one measure for boxes and other sets, whose steps have all of its vectors in common.
 template <int N, int M>
 [[nodiscard]] double law_violation(
     const detail::AnyMatrices<N, M>& m, double t,

@@ -405,7 +405,7 @@ public:
             copy_padded(part, rate);
         }
     }
-
+    // Long: a list of functions, one for each entry of the table.
     [[nodiscard]] static constexpr Table table()
     {
         using S = const void*;
