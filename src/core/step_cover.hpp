@@ -281,6 +281,7 @@ inline auto StepCover<X, single>::divide(const Task& task, const GuardSample& st
     return GuardSample{.s = last.s, .value = sign_of(task.side) * last.bound.distance};
 }
 
+// Long: one search whose nodes, range and evidence its parts have in common.
 template <class X, bool single>
 inline auto StepCover<X, single>::enclose(const Task& task, const GuardSample& start,
                                           GuardSample end) -> std::optional<GuardSample>

@@ -483,6 +483,7 @@ RICOCHET_INLINE void range_of_smooth(V& c, V& b, V& r) noexcept
 /// latency of one, and they fit in 16 registers.
 inline constexpr std::size_t range_registers = 2;
 
+// Long: one pass through the layers, whose buffers and registers its parts have in common.
 template <class Activation>
 GuardRange guard_along(const GuardLayers& net, const double* centre, const double* slope,
                        const double* radius) noexcept

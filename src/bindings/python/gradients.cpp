@@ -728,6 +728,7 @@ private:
 };
 
 /// A periodic orbit by shooting, as a dictionary.
+// Long: one list of what is given, of the shot that the search repeats, and of what it has found.
 [[nodiscard]] py::dict find_orbit(const std::shared_ptr<const Recorded>& of, const Numbers& guess,
                                   const Numbers& own, const std::vector<Numbers>& networks,
                                   const py::dict& options, const std::string& method, double period,
@@ -895,6 +896,7 @@ template <class Of>
 
 namespace py = pybind11;
 
+// Long: a list of what the module has.
 PYBIND11_MODULE(_gradients, module)
 {
     using namespace ricochet;

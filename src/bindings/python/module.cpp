@@ -69,6 +69,7 @@ py::list described_systems()
 
 }  // namespace
 
+// Long: a list of what the module has.
 PYBIND11_MODULE(_ricochet, module)
 {
     using namespace ricochet::python;

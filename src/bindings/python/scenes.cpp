@@ -420,6 +420,7 @@ using Rows = py::array_t<double, py::array::c_style | py::array::forcecast>;
     return std::make_shared<PyScene>(PyScene{std::move(file.scene), std::move(file.options)});
 }
 
+// Long: a list of what a scene is built of.
 void bind_parts(py::class_<PyScene, std::shared_ptr<PyScene>>& scene)
 {
     scene
@@ -519,6 +520,7 @@ void bind_parts(py::class_<PyScene, std::shared_ptr<PyScene>>& scene)
 
 }  // namespace ricochet::python
 
+// Long: a list of what the module has.
 PYBIND11_MODULE(_scenes, module)
 {
     using namespace ricochet;

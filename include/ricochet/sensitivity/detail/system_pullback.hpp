@@ -24,30 +24,12 @@
 #include "ricochet/detail/dual_derivatives.hpp"
 #include "ricochet/sensitivity/detail/dual_parameter.hpp"
 #include "ricochet/sensitivity/detail/linearization.hpp"
-#include "ricochet/sensitivity/detail/reverse.hpp"
+#include "ricochet/sensitivity/family.hpp"
 #include "ricochet/sensitivity/pullback.hpp"
+#include "ricochet/sensitivity/reverse.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet {
-
-/// A system that is a template over the scalar of its parameters, and their values:
-///
-///     Family{[](auto p) { return Ball<typename decltype(p)::value_type>{p[0], p[1]}; }, {9.81,
-///     0.9}}
-///
-/// `make` takes a `std::span` of constant numbers of any scalar; the system copies those that it
-/// keeps.
-template <class Make>
-struct Family {
-    Make make;
-    std::vector<double> values;  ///< of the parameters of the system that is run
-
-    using System = std::remove_cvref_t<std::invoke_result_t<const Make&, std::span<const double>>>;
-
-    [[nodiscard]] System system() const { return make(std::span<const double>(values)); }
-};
-template <class Make>
-Family(Make, std::vector<double>) -> Family<Make>;
 
 namespace detail {
 

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // Reverse mode: a scalar that records what is computed with it, and the sweep back through the
 // record.
 //
