@@ -65,8 +65,12 @@ struct NeuralOrbitCounts {
     }
 };
 
-/// A network that is zero somewhere on a random orbit, steep enough that dips are thin: its weights
-/// are three times those with which training starts.
+inline constexpr double neural_orbit_time = 6;  // [s]
+inline constexpr int neural_orbit_samples = 24'000;
+
+/// A network of random weights, three times as large as those with which training starts, whose
+/// level is such that one of its minima on a random orbit is a dip of 1e-5 to 0.1: most steps that
+/// hold such a dip have both ends on the same side.
 [[nodiscard]] inline NeuralOrbit random_neural_orbit(std::uint64_t seed, NeuralOrbit::State& start)
 {
     std::mt19937_64 random(seed);
@@ -76,14 +80,20 @@ struct NeuralOrbitCounts {
     for (double& weight : model.layers[0].weight) weight *= 3;
     start = {uniform(random), uniform(random), uniform(random), 1.5 * uniform(random)};
     NeuralOrbit orbit{GuardNetwork(model), 1.2 + std::fabs(uniform(random))};
-    const auto there = orbit.place(start, 3 + 2 * uniform(random));
-    model.layers.back().bias[0] -= orbit.network(there) + 0.02 * uniform(random);
+    std::vector<double> minima;
+    constexpr double interval = neural_orbit_time / 1500;  // [s]
+    double before = orbit.network(orbit.place(start, 0)), here = before;
+    for (int k = 1; k < 1500; ++k) {
+        const double after = orbit.network(orbit.place(start, k * interval));
+        if (here < before && here < after) minima.push_back(here);
+        before = here;
+        here = after;
+    }
+    const double least = minima.empty() ? here : minima[seed / 3 % minima.size()];
+    model.layers.back().bias[0] -= least + std::pow(10.0, -3 + 2 * uniform(random));
     orbit.network = GuardNetwork(model);
     return orbit;
 }
-
-inline constexpr double neural_orbit_time = 6;  // [s]
-inline constexpr int neural_orbit_samples = 24'000;
 
 /// Times [s] of the crossings between samples of the network on the known orbit. A dip of less than
 /// 1e-6 is left out: the orbits of a run and of the reference differ by up to 1e-8, and the

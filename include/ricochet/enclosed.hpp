@@ -76,9 +76,10 @@ struct EnclosedOptions {
     std::size_t longest_interval = 256;
 };
 
-/// Detector that proves guards clear along intervals, and leaves the rest to `Exact`. The evidence
-/// of a step is `proved` where the whole of it is, and else that of `Exact`. Enclosures are counted
-/// as `Statistics::bound_calls`.
+/// Detector that proves guards clear along intervals, and leaves the rest to `Exact`: all of it
+/// where the guards are no templates, so that `EnclosableGuards` does not hold for system and
+/// state. The evidence of a step is `proved` where the whole of it is, and else that of `Exact`.
+/// Enclosures are counted as `Statistics::bound_calls`.
 template <class Exact = Extremum>
 class Enclosed : public detail::PutsOff<Exact> {
 public:
@@ -95,15 +96,18 @@ public:
 
     [[nodiscard]] std::size_t longest() const noexcept { return longest_; }
 
+    /// Whether the guards of a system can be enclosed; those of others are left to `Exact`.
+    template <class System, class X>
+    [[nodiscard]] static constexpr bool suits() noexcept
+    {
+        return EnclosableGuards<System, X>;
+    }
+
     /// The guard on a tube around the motion.
     template <class X, class System, class C>
     [[nodiscard]] static Enclosure along(const System& system, const GuardInMode& of,
                                          const detail::MotionTube<C>& tube)
     {
-        static_assert(EnclosableGuards<System, X>,
-                      "ricochet: found Enclosed with a guard of numbers alone; expected a template "
-                      "such as template <class X> ScalarOf<X> guard(const ScalarOf<X>& t, const X& "
-                      "x) const, or another detector");
         return detail::guard_on_tube<X>(system, of, tube);
     }
 

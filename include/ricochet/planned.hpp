@@ -296,7 +296,9 @@ private:
 template <class Detector, class System, class X>
 [[nodiscard]] constexpr bool defers_checks() noexcept
 {
-    if constexpr (Guarded<System, X> && requires { Detector::defers; }) {
+    if constexpr (Guarded<System, X> && requires { Detector::template suits<System, X>(); }) {
+        return Detector::template suits<System, X>();
+    } else if constexpr (Guarded<System, X> && requires { Detector::defers; }) {
         return !Detector::needs_bounds || BoundedGuards<System, X>;
     } else {
         return false;

@@ -93,7 +93,8 @@ private:
     /// Enclosures of a guard in an interval. Each that closes a part takes some before it that do
     /// not, and beside the surface parts shrink to the finest.
     static constexpr std::size_t most_enclosures = 256;
-    /// Part of an interval before its end in which a crossing is left to the locator.
+    /// Part of an interval before its end in which a crossing is left to the locator, if that is no
+    /// longer than `finest_part` of the step: several crossings in it would be taken for one.
     static constexpr double last_part = 0.25;
     /// Shortest part of a step that is enclosed: the resolution of a location is not far below it.
     static constexpr double finest_enclosed = 0x1p-30;
@@ -305,6 +306,7 @@ inline auto StepCover<X, single>::enclose(const Task& task, const GuardSample& s
     const auto touch_of = [&](double size) { return task.bank.touch_of(i, 2 * size); };
     const auto is_across = [&](double value) { return sign * value < -touch_of(std::fabs(value)); };
     const double whole = end.s - start.s;
+    const double left_over = std::min(last_part * whole, finest_part * step.h());
     double s = start.s;
     double width = first_interval_ > 0 ? std::min(first_interval_, whole) : whole;
     bool has_failed = first_interval_ > 0;
@@ -314,11 +316,11 @@ inline auto StepCover<X, single>::enclose(const Task& task, const GuardSample& s
     const auto is_bracketed = [&](double probe) {
         if (!(end.value == end.value)) end.value = value_at(end.s);
         if (sign * end.value > touch_of(std::fabs(end.value))) return false;
-        if (probe < end.s && end.s - s > last_part * whole) {
+        if (probe < end.s && end.s - s > left_over) {
             const double value = value_at(probe);
             if (is_across(value)) end = {.s = probe, .value = value};
         }
-        return end.s - s <= last_part * whole;
+        return end.s - s <= left_over;
     };
     const auto bracket = [&]() -> std::optional<GuardSample> {
         found_.proved = false;

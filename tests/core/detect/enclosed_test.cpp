@@ -222,8 +222,12 @@ TEST(Enclosed, RefusesAnIntervalOfNoSteps)
 
 TEST(Enclosed, LosesNoCrossingOfRandomNetworks)
 {
+    // In a step of dopri5 the network of seed 6132 leaves its side three times, the last time near
+    // the end of the step.
     NeuralOrbitCounts fixed, controlled;
-    for (std::uint64_t seed = 1; seed <= 60; ++seed) {
+    std::vector<std::uint64_t> seeds{6132};
+    for (std::uint64_t seed = 1; seed <= 60; ++seed) seeds.push_back(seed);
+    for (const std::uint64_t seed : seeds) {
         NeuralOrbit::State start{};
         const NeuralOrbit orbit = random_neural_orbit(seed, start);
         const std::vector<double> reference = reference_crossings(orbit, start);
