@@ -1,4 +1,4 @@
-// Runs of systems with set_valued() through all doors, and what is expected of them.
+// Runs of systems with set_valued() through all adapters, and what is expected of them.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ template <class System, class X>
     return simulation->x();
 }
 
-/// Integrates through all doors, which have to agree, and returns the run of `integrate`.
+/// Integrates through all adapters, which have to agree, and returns the run of `integrate`.
 template <class System, class X>
 [[nodiscard]] auto run_of(const System& system, const X& x0, const Options& options)
 {

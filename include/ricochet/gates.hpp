@@ -11,9 +11,9 @@
 
 #include "ricochet/base/detail/owner.hpp"
 #include "ricochet/detail/arithmetic.hpp"
-#include "ricochet/detail/around.hpp"
 #include "ricochet/detail/features.hpp"
 #include "ricochet/detail/meter.hpp"
+#include "ricochet/detail/wrapped_detector.hpp"
 #include "ricochet/extremum.hpp"
 #include "ricochet/gate.hpp"
 #include "ricochet/nn/mlp.hpp"
@@ -154,14 +154,14 @@ private:
 /// Detector that counts how often a network predicts the finding of `Exact`, and defers checks if
 /// the guard declares bounds. The events are those of `Exact`, bit for bit, whatever the weights.
 template <class Exact = Extremum>
-class Verified : public detail::Around<Exact> {
+class Verified : public detail::WrappedDetector<Exact> {
 public:
     static constexpr bool checks_every_step = true;
     static constexpr bool keeps_events = true;
 
     /// Takes the network that predicts and the exact detector that decides.
     explicit Verified(BareNetwork network, const Exact& exact = {})
-        : detail::Around<Exact>(exact), network_(std::move(network))
+        : detail::WrappedDetector<Exact>(exact), network_(std::move(network))
     {
     }
 

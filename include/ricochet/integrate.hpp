@@ -26,8 +26,8 @@ requires Flowing<System, X> && StateVector<X>
                                const Locator& locator = {})
 {
     static_assert(detail::has_flow_alone<System>());
-    detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
-                                                                     locator);
+    detail::RunComponents<System, X, Stepping, Detector, Locator> parts(system, x0, stepping,
+                                                                        detector, locator);
     return detail::run_for_caller(parts.setup(), x0, options);
 }
 

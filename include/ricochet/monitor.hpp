@@ -454,17 +454,17 @@ private:
     class Parts {
     public:
         Parts(const System& system, const X& like, const Detector& detector, const Locator& locator)
-            : door_(system, like), detector_(detector), locator_(locator)
+            : adapter_(system, like), detector_(detector), locator_(locator)
         {
             detail::check_bound_declarations<System, X>();
         }
         Parts(const Parts&) = delete;
         Parts& operator=(const Parts&) = delete;
 
-        [[nodiscard]] detail::RunSetup<Core> setup() noexcept
+        [[nodiscard]] detail::RunBindings<Core> setup() noexcept
         {
             return {.system = &table,
-                    .door = &door_,
+                    .adapter = &adapter_,
                     .detector = detail::DetectorTableOf<Detector, System, X>::make(detector_),
                     .detecting = &detector_,
                     .locator = detail::locator_table<Locator>(),
@@ -482,7 +482,7 @@ private:
         }
         static constexpr detail::SystemTable<Core> table = of_whole_states();
 
-        detail::Door<System, X> door_;
+        detail::SystemAdapter<System, X> adapter_;
         Detector detector_;
         Locator locator_;
     };

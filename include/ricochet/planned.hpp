@@ -19,8 +19,8 @@
 
 #include "ricochet/bounds.hpp"
 #include "ricochet/detail/arithmetic.hpp"
-#include "ricochet/detail/around.hpp"
 #include "ricochet/detail/debug_checks.hpp"
+#include "ricochet/detail/wrapped_detector.hpp"
 #include "ricochet/extremum.hpp"
 
 namespace ricochet {
@@ -147,11 +147,11 @@ void validate(const PlannerOptions& options);
 [[noreturn]] void throw_bad_slope_skip(double fraction, std::size_t longest);
 
 template <class Exact>
-class PutsOff : public Around<Exact> {
+class PutsOff : public WrappedDetector<Exact> {
 public:
     static constexpr bool defers = true;
 
-    using Around<Exact>::Around;
+    using WrappedDetector<Exact>::WrappedDetector;
 };
 
 }  // namespace detail

@@ -205,15 +205,15 @@ struct RosenbrockRoom {
 };
 
 template <class System, class X>
-struct StepperDoor<System, X, Rosenbrock4> : Door<System, X> {
+struct StepperAdapter<System, X, Rosenbrock4> : SystemAdapter<System, X> {
     static_assert(
         !JacobianMisfits<System, X>,
         "ricochet: found a jacobian whose parameters do not fit, or that is not const; "
         "expected void jacobian([Mode,] double t, const State& x, std::span<double> rows) "
         "const");
 
-    StepperDoor(const System& system, const X& like)
-        : Door<System, X>(system, like), room(core_state(like))
+    StepperAdapter(const System& system, const X& like)
+        : SystemAdapter<System, X>(system, like), room(core_state(like))
     {
     }
     using Room =
@@ -225,7 +225,7 @@ template <class System, class X>
 class KernelOf<System, X, Rosenbrock4> {
     using C = CoreState<X>;
     using State = StepState<C>;
-    using D = StepperDoor<System, X, Rosenbrock4>;
+    using D = StepperAdapter<System, X, Rosenbrock4>;
     using Room = typename D::Room;
     using Table = RodasTableau;
 
@@ -242,16 +242,16 @@ class KernelOf<System, X, Rosenbrock4> {
         }
     }
 
-    [[nodiscard]] static D& at(void* door) noexcept
+    [[nodiscard]] static D& at(void* adapter) noexcept
     {
-        return *static_cast<D*>(static_cast<Door<System, X>*>(door));
+        return *static_cast<D*>(static_cast<SystemAdapter<System, X>*>(adapter));
     }
 
     /// Writes dx/ds at offset s and state x into `rate`.
-    static void flow(D& door, State& state, double s, const C& x, C& rate)
+    static void flow(D& adapter, State& state, double s, const C& x, C& rate)
     {
         ++state.flow_calls;
-        state.flow_fits &= door.flow(state.mode, state.flow_time(s), x, rate);
+        state.flow_fits &= adapter.flow(state.mode, state.flow_time(s), x, rate);
         if (state.backward) {
             for_components(x, [&](auto i) { rate[i] = -rate[i]; });
         }
@@ -259,25 +259,25 @@ class KernelOf<System, X, Rosenbrock4> {
 
     // --- the Jacobian ---
 
-    static void jacobian_written(D& door, const State& state)
+    static void jacobian_written(D& adapter, const State& state)
     {
-        Room& room = door.room;
+        Room& room = adapter.room;
         const std::span<double> rows(room.jacobian.data(), room.jacobian.size());
-        const X& x = door.read(state.x0, 0);
+        const X& x = adapter.read(state.x0, 0);
         const double t = state.flow_time(0);
-        if constexpr (requires { door.system().jacobian(state.mode, t, x, rows); }) {
-            door.system().jacobian(state.mode, t, x, rows);
+        if constexpr (requires { adapter.system().jacobian(state.mode, t, x, rows); }) {
+            adapter.system().jacobian(state.mode, t, x, rows);
         } else {
-            door.system().jacobian(t, x, rows);
+            adapter.system().jacobian(t, x, rows);
         }
     }
 
     /// Columns of the Jacobian, and after them the derivative by time, four at a time.
-    static void jacobian_by_duals(D& door, State& state)
+    static void jacobian_by_duals(D& adapter, State& state)
     {
         constexpr std::size_t width = 4;
         using S = Dual<width>;
-        Room& room = door.room;
+        Room& room = adapter.room;
         const std::size_t n = state.x0.size();
         Scratch<WithScalar<X, S>, 2> states(state.x0);
         for (std::size_t first = 0; first <= n; first += width) {
@@ -288,7 +288,7 @@ class KernelOf<System, X, Rosenbrock4> {
                 if (first <= i && i < first + width) x.slope[i - first] = 1;
             }
             ++state.flow_calls;
-            flow_of_scalar(door.system(), state.mode, time, states[0], states[1]);
+            flow_of_scalar(adapter.system(), state.mode, time, states[0], states[1]);
             for (std::size_t k = 0; k < width && first + k <= n; ++k) {
                 for (std::size_t i = 0; i < n; ++i) {
                     double& to =
@@ -299,16 +299,16 @@ class KernelOf<System, X, Rosenbrock4> {
         }
     }
 
-    static void jacobian_by_differences(D& door, State& state)
+    static void jacobian_by_differences(D& adapter, State& state)
     {
-        Room& room = door.room;
+        Room& room = adapter.room;
         const std::size_t n = state.x0.size();
         for (std::size_t j = 0; j < n; ++j) {
             room.at = state.x0;
             const double moved = state.x0[j] + std::copysign(reach_of(state.x0[j]), room.rate[j]);
             room.at[j] = moved;
             const double delta = moved - state.x0[j];
-            flow(door, state, 0, room.at, room.flow);
+            flow(adapter, state, 0, room.at, room.flow);
             for (std::size_t i = 0; i < n; ++i) {
                 room.jacobian[i * n + j] = (room.flow[i] - room.rate[i]) / delta;
             }
@@ -317,13 +317,13 @@ class KernelOf<System, X, Rosenbrock4> {
 
     /// df/ds by a difference forward from the start, inside the step of length h, where the flow
     /// exists.
-    static void by_time_by_differences(D& door, State& state, double h)
+    static void by_time_by_differences(D& adapter, State& state, double h)
     {
-        Room& room = door.room;
+        Room& room = adapter.room;
         const double reach = std::min(reach_of(state.start.value), h);
         const double later = state.start.plus(state.in_time(reach));
         const double delta = state.in_time(later - state.start.value);
-        flow(door, state, delta, state.x0, room.flow);
+        flow(adapter, state, delta, state.x0, room.flow);
         for_components(state.x0,
                        [&](auto i) { room.by_time[i] = (room.flow[i] - room.rate[i]) / delta; });
     }
@@ -338,9 +338,9 @@ class KernelOf<System, X, Rosenbrock4> {
 
     /// Computes f, df/ds and J at the start of a step of length h, unless they are known for this
     /// very start.
-    static void prepare(D& door, State& state, double h)
+    static void prepare(D& adapter, State& state, double h)
     {
-        Room& room = door.room;
+        Room& room = adapter.room;
         bool same = room.known && room.start.value == state.start.value &&
                     room.start.remainder == state.start.remainder && room.mode == state.mode &&
                     room.backward == state.backward && room.x.size() == state.x0.size();
@@ -350,21 +350,21 @@ class KernelOf<System, X, Rosenbrock4> {
         if (room.x.size() != state.x0.size()) room = Room(state.x0);
         room.known = false;  // stays so if the flow throws
         room.h = room.factored = std::numeric_limits<double>::quiet_NaN();
-        flow(door, state, 0, state.x0, room.rate);
+        flow(adapter, state, 0, state.x0, room.rate);
         const double sign = state.backward ? -1 : 1;
         const auto turn = [&] {
             for (double& each : room.jacobian) each *= sign;
         };
         if constexpr (JacobianWritten<System, X>) {
-            jacobian_written(door, state);
+            jacobian_written(adapter, state);
             turn();
-            by_time_by_differences(door, state, h);
+            by_time_by_differences(adapter, state, h);
         } else if constexpr (by_duals) {
-            jacobian_by_duals(door, state);
+            jacobian_by_duals(adapter, state);
             turn();  // but not df/ds, whose sign changes twice
         } else {
-            jacobian_by_differences(door, state);
-            by_time_by_differences(door, state, h);
+            jacobian_by_differences(adapter, state);
+            by_time_by_differences(adapter, state, h);
         }
         for_components(state.x0, [&](auto i) {
             const double* const row =
@@ -396,10 +396,10 @@ class KernelOf<System, X, Rosenbrock4> {
     }
 
     /// Computes increment and error of a step of length h; false if it cannot be solved.
-    static bool solve(D& door, State& state, double h)
+    static bool solve(D& adapter, State& state, double h)
     {
-        prepare(door, state, h);
-        Room& room = door.room;
+        prepare(adapter, state, h);
+        Room& room = adapter.room;
         const std::size_t n = state.x0.size();
         if (!factorize_for(room, h)) return false;
         assign(room.steady, room.alone);
@@ -407,7 +407,7 @@ class KernelOf<System, X, Rosenbrock4> {
             if (k > 0) {
                 assign(room.at, state.x0);
                 for (std::size_t j = 0; j < k; ++j) add(room.at, Table::a[k][j], room.stages[j]);
-                flow(door, state, Table::c[k] * h, room.at, room.flow);
+                flow(adapter, state, Table::c[k] * h, room.at, room.flow);
                 note_changes(room, room.flow);
             }
             C& stage = room.stages[k];
@@ -417,7 +417,7 @@ class KernelOf<System, X, Rosenbrock4> {
             substitute(n, room.factors.data(), room.rows.data(), stage);
         }
         add(room.at, 1, room.stages[4]);
-        flow(door, state, h, room.at, room.error);
+        flow(adapter, state, h, room.at, room.error);
         note_changes(room, room.error);
         for (std::size_t j = 0; j < 5; ++j) add(room.error, Table::m[5][j] / h, room.stages[j]);
         substitute(n, room.factors.data(), room.rows.data(), room.error);
@@ -463,9 +463,9 @@ class KernelOf<System, X, Rosenbrock4> {
     }
 
     /// Takes the current step; false if it is not finite.
-    static bool go(void* door, State& state, double h)
+    static bool go(void* adapter, State& state, double h)
     {
-        D& of = at(door);
+        D& of = at(adapter);
         state.h = h;
         state.has_middle = false;
         state.asked_alone = 0;
@@ -494,12 +494,12 @@ class KernelOf<System, X, Rosenbrock4> {
         return sum == 0;
     }
 
-    static bool take(void* door, State& state, double h) { return go(door, state, h); }
+    static bool take(void* adapter, State& state, double h) { return go(adapter, state, h); }
 
-    static double attempt(void* door, State& state, double h, double rtol, double atol)
+    static double attempt(void* adapter, State& state, double h, double rtol, double atol)
     {
-        if (!go(door, state, h)) return std::numeric_limits<double>::quiet_NaN();
-        return largest_ratio(state, at(door).room.error, rtol, atol);
+        if (!go(adapter, state, h)) return std::numeric_limits<double>::quiet_NaN();
+        return largest_ratio(state, at(adapter).room.error, rtol, atol);
     }
 
     /// The largest ratio of a component's error to its tolerance.
@@ -522,9 +522,9 @@ class KernelOf<System, X, Rosenbrock4> {
     /// The step damps a transient that is faster than itself, and its error estimate with it, but
     /// the interpolant overshoots as far to the other side. The difference between the flow at the
     /// start and the slope of the interpolant, damped as in a stage, is the size of that transient.
-    static double roughness(void* door, State& state, double rtol, double atol)
+    static double roughness(void* adapter, State& state, double rtol, double atol)
     {
-        D& of = at(door);
+        D& of = at(adapter);
         Room& room = of.room;
         if (!solve(of, state, state.h)) return 0;
         for_components(state.x0, [&](auto i) { room.at[i] = room.rate[i] - state.rate0[i]; });
@@ -547,13 +547,13 @@ class KernelOf<System, X, Rosenbrock4> {
     /// order h^4, and damping changes them by order h^5, the local error of the method. False where
     /// a second damping would change the first of them by more than the tolerance: the step is
     /// longer than a transient.
-    static bool find_quartic(D& door, State& state, double rtol, double atol)
+    static bool find_quartic(D& adapter, State& state, double rtol, double atol)
     {
-        Room& room = door.room;
+        Room& room = adapter.room;
         const double h = state.h;
         const std::size_t n = state.x0.size();
         if (!factorize_for(room, h)) return false;
-        flow(door, state, h, state.x1, room.flow);
+        flow(adapter, state, h, state.x1, room.flow);
         for_components(state.x0, [&](auto i) {
             const auto c = static_cast<std::size_t>(i);
             double curvature = room.by_time[i];
@@ -579,10 +579,10 @@ class KernelOf<System, X, Rosenbrock4> {
 
     /// The quartic at u, moved by gamma h (I - gamma h J)^-1 (f(x) - x'). That changes a point of
     /// order h^5 by order h^5, and puts stiff components on the slow motion.
-    static bool sample(void* door, State& state, double s, double rtol, double atol, C& w)
+    static bool sample(void* adapter, State& state, double s, double rtol, double atol, C& w)
     {
         using enum Quartic;
-        D& of = at(door);
+        D& of = at(adapter);
         Room& room = of.room;
         const double h = state.h;
         if (room.h != h) return false;
@@ -624,9 +624,9 @@ class KernelOf<System, X, Rosenbrock4> {
     }
 
     /// The method's own step of another length from the same start.
-    static void depart(void* door, State& state, double s, C& w, C& rate)
+    static void depart(void* adapter, State& state, double s, C& w, C& rate)
     {
-        D& of = at(door);
+        D& of = at(adapter);
         if (s == 0 || !solve(of, state, s)) {
             const double lost = s == 0 ? 0 : std::numeric_limits<double>::quiet_NaN();
             for_components(w, [&](auto i) { w[i] = rate[i] = lost; });
@@ -639,12 +639,12 @@ class KernelOf<System, X, Rosenbrock4> {
         });
     }
 
-    static detail::SeriesTerms series(void* door, const State& state)
+    static detail::SeriesTerms series(void* adapter, const State& state)
     {
-        return {at(door).room.series.data(), 3, static_cast<std::size_t>(state.x0.size())};
+        return {at(adapter).room.series.data(), 3, static_cast<std::size_t>(state.x0.size())};
     }
 
-    static void renew(void* door) { at(door).room.known = false; }
+    static void renew(void* adapter) { at(adapter).room.known = false; }
 
 public:
     [[nodiscard]] static constexpr StepKernel<C> make()

@@ -38,7 +38,7 @@ namespace detail {
 
 /// Parts of a run besides its start and its options, at addresses that do not change.
 template <class System, class X, class Stepping, class Detector, class Locator>
-class PartsOfRun {
+class RunComponents {
     static_assert(
         requires { typename Stepping::method; },
         "ricochet: found no stepping behind the options; expected ErrorControlled<Method> or "
@@ -112,24 +112,25 @@ class PartsOfRun {
     /// The order that was chosen for the method.
     [[nodiscard]] int order() const noexcept
     {
-        if constexpr (requires { door_.given_order; }) return door_.given_order;
+        if constexpr (requires { adapter_.given_order; }) return adapter_.given_order;
         return 0;
     }
 
 public:
-    PartsOfRun(const System& system, const X& x0, const Stepping& stepping,
-               const Detector& detector, const Locator& locator)
-        : door_(system, x0), stepping_(stepping), detector_(detector), locator_(locator)
+    RunComponents(const System& system, const X& x0, const Stepping& stepping,
+                  const Detector& detector, const Locator& locator)
+        : adapter_(system, x0), stepping_(stepping), detector_(detector), locator_(locator)
     {
         check_bound_declarations<System, X>();
-        if constexpr (requires { door_.prepare(stepping_.value); }) door_.prepare(stepping_.value);
+        if constexpr (requires { adapter_.prepare(stepping_.value); })
+            adapter_.prepare(stepping_.value);
     }
-    PartsOfRun(const PartsOfRun&) = delete;
-    PartsOfRun& operator=(const PartsOfRun&) = delete;
+    RunComponents(const RunComponents&) = delete;
+    RunComponents& operator=(const RunComponents&) = delete;
 
-    [[nodiscard]] Door<System, X>& door() noexcept
+    [[nodiscard]] SystemAdapter<System, X>& adapter() noexcept
     {
-        return door_;
+        return adapter_;
     }
     /// The method's name; Dormand and Prince's for one without a name.
     [[nodiscard]] MethodName method_name() const noexcept
@@ -138,10 +139,10 @@ public:
         if constexpr (NameOf<Method>::known) return NameOf<Method>::name;
         return MethodName::dopri5;
     }
-    [[nodiscard]] RunSetup<C> setup() noexcept
+    [[nodiscard]] RunBindings<C> setup() noexcept
     {
         return {.system = &system_table<System, X>,
-                .door = static_cast<Door<System, X>*>(&door_),
+                .adapter = static_cast<SystemAdapter<System, X>*>(&adapter_),
                 .kernel = &kernel_for<System, X>(stepping_.value),
                 .quiet = quiet(),
                 .quiet_on_series = by_series,
@@ -156,7 +157,7 @@ public:
     }
 
 private:
-    StepperDoor<System, X, Method> door_;
+    StepperAdapter<System, X, Method> adapter_;
     Stepping stepping_;
     Detector detector_;
     Locator locator_;
@@ -278,7 +279,7 @@ void add_event(void* events, const Event<CoreState<X>>& event)
 
 /// The whole run of a set-up.
 template <class X>
-[[nodiscard]] Run<X> run_for_caller(RunSetup<CoreState<X>> setup, const X& x0,
+[[nodiscard]] Run<X> run_for_caller(RunBindings<CoreState<X>> setup, const X& x0,
                                     const Options& options)
 {
     if constexpr (std::is_same_v<CoreState<X>, SmallState> && is_array<X>) {
@@ -361,7 +362,7 @@ template <class System, class X = detail::DeclaredState<System>,
           class Locator = Newton>
 class Simulation {
     static_assert(detail::check_system<System, X>());
-    using Parts = detail::PartsOfRun<System, X, Stepping, Detector, Locator>;
+    using Parts = detail::RunComponents<System, X, Stepping, Detector, Locator>;
     using C = detail::CoreState<X>;
     static constexpr bool same = std::is_same_v<X, C>;
 

@@ -197,7 +197,7 @@ private:
     [[nodiscard]] Enclosure range(const GuardInMode& of, double sign, double t0, double t1) const
     {
         const MotionTube<X> tube(t0, t1, nodes_);
-        const Enclosure range = detector_->along(self_, system_.door(), of, tube);
+        const Enclosure range = detector_->along(self_, system_.adapter(), of, tube);
         return {sign * range.centre, sign * range.slope, range.radius};
     }
 

@@ -65,15 +65,15 @@ protected:
 
     /// Places the current step at the start. Keeps a reference to `setup`.
     /// @param options  options that have been validated
-    EventEngine(const RunSetup<X>& setup, const X& x0, const Options& options)
+    EventEngine(const RunBindings<X>& setup, const X& x0, const Options& options)
         : setup_(setup),
           span_(span_of(setup, options)),
-          system_(*setup.system, setup.door, &span_),
+          system_(*setup.system, setup.adapter, &span_),
           finders_{setup.detector, setup.detecting, setup.locator, setup.locating},
           error_controlled_(setup.error_controlled),
           guarded_(system_->guarded),
           phases_(system_->phases),
-          own_guards_(phases_ ? phases_->own_guards(phases_->door) : no_guard),
+          own_guards_(phases_ ? phases_->own_guards(phases_->adapter) : no_guard),
           resets_any_(system_->resets()),
           timed_(system_->timed()),
           defers_(defers(setup.detector, *setup.system)),
@@ -100,7 +100,7 @@ protected:
     // --- set-up ---
 
     /// The times at which functions may be called; a host may go on for ever.
-    [[nodiscard]] static RunSpan<X> span_of(const RunSetup<X>& setup, const Options& options)
+    [[nodiscard]] static RunSpan<X> span_of(const RunBindings<X>& setup, const Options& options)
     {
         if (!setup.kernel->take) return {};
         return {.from = std::min(options.t_start, options.t_end),
@@ -128,7 +128,7 @@ protected:
                               step_.mode(),
                               resets_.mode(),
                               search_.before()};
-        resets_.move_to(phases_->decide(phases_->door, set, resets_.after()));
+        resets_.move_to(phases_->decide(phases_->adapter, set, resets_.after()));
     }
 
     /// Records the changes of reactions at a set that no guard of the system stands for.
@@ -1030,7 +1030,7 @@ protected:
     /// step.
     static constexpr double low_part = 0.05;
 
-    const RunSetup<X>& setup_;
+    const RunBindings<X>& setup_;
     RunSpan<X> span_;
     SystemAt<X> system_;
     Finders<X> finders_;

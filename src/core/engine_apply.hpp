@@ -130,12 +130,12 @@ inline void EventEngine<X, single>::find_time_event(After what)
     due_here_ = false;
     if (backward_) {
         if (system_->previous_time_event) {
-            time_event_ = system_->previous_time_event(system_.door(), t);
+            time_event_ = system_->previous_time_event(system_.adapter(), t);
         }
     } else if (system_->next_time_event_at) {
-        time_event_ = system_->next_time_event_at(system_.door(), step_.mode(), t, step_.x0());
+        time_event_ = system_->next_time_event_at(system_.adapter(), step_.mode(), t, step_.x0());
     } else {
-        time_event_ = system_->next_time_event(system_.door(), t);
+        time_event_ = system_->next_time_event(system_.adapter(), t);
     }
     if (is_due_here(what)) {
         due_here_ = true;
@@ -158,7 +158,7 @@ inline bool EventEngine<X, single>::is_due_here(After what)
             listed_at_ = t;
             const bool is_past =
                 what == After::restart || (what == After::start && options_.continues);
-            listed_left_ = is_past ? 0 : system_->time_event_count(system_.door(), t);
+            listed_left_ = is_past ? 0 : system_->time_event_count(system_.adapter(), t);
         }
         if (what == After::time_event && listed_left_ > 0) --listed_left_;
         return listed_left_ > 0;

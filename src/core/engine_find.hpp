@@ -96,7 +96,8 @@ inline bool EventEngine<X, single>::ask_network()
 {
     ++run_.statistics.network_calls;
     return meter_.time_network([&] {
-        return finders_.detector.clears(finders_.detecting, system_.door(), step_.state(), calls());
+        return finders_.detector.clears(finders_.detecting, system_.adapter(), step_.state(),
+                                        calls());
     });
 }
 

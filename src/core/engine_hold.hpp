@@ -108,7 +108,7 @@ bool EventEngine<X, single>::is_at_rest(std::size_t i)
     const double g = bank_.view(i, mode, calls()).value(t, step_.x0());
     if (!(std::fabs(g) <= rounding_of(i))) return false;
     X x = step_.x0();
-    return system_->rest(system_.door(), i, mode, t, x) == mode && same_state(x, step_.x0());
+    return system_->rest(system_.adapter(), i, mode, t, x) == mode && same_state(x, step_.x0());
 }
 
 template <class X, bool single>
@@ -137,7 +137,7 @@ bool EventEngine<X, single>::finds_components(Hold& hold)
     X earlier = x, later = x;
     const double t = step_.time(0);
     const auto rest = [&](double at, X& to) {
-        static_cast<void>(system_->rest(system_.door(), hold.guard, step_.mode(), at, to));
+        static_cast<void>(system_->rest(system_.adapter(), hold.guard, step_.mode(), at, to));
         return to.size() == x.size();
     };
     if (!rest(t, up) || !rest(t, down) || !rest(step_.inside(t - h_next_), earlier) ||

@@ -197,7 +197,7 @@ inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, boo
     const Side side = bank_[i].side;
     count_event(i, t, located ? side : opposite(side));
     const ReactionChange* const change = phases_ ? change_under(i) : nullptr;
-    if (phases_ && !phases_->records(phases_->door, i)) {
+    if (phases_ && !phases_->records(phases_->adapter, i)) {
         run_.statistics.events -= !is_of_phases(i);
         return;
     }
@@ -221,7 +221,7 @@ inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, boo
 template <class X, bool single>
 const ReactionChange* EventEngine<X, single>::change_under(std::size_t guard)
 {
-    for (const ReactionChange& change : phases_->changes(phases_->door)) {
+    for (const ReactionChange& change : phases_->changes(phases_->adapter)) {
         if (change.guard == guard) return &change;
     }
     return nullptr;
@@ -231,7 +231,7 @@ template <class X, bool single>
 void EventEngine<X, single>::record_changes(double t, bool located)
 {
     const bool led = !search_.fired().empty() || on_time_;
-    for (const ReactionChange& change : phases_->changes(phases_->door)) {
+    for (const ReactionChange& change : phases_->changes(phases_->adapter)) {
         if (change.guard != no_guard) continue;
         ++run_.statistics.events;
         if (options_.stop_at_event) {

@@ -224,8 +224,8 @@ inline std::size_t EventEngine<X, single>::resting_of_cycle(std::size_t i)
     if (!system_->rest) return no_guard;
     if (!system_->rests) return i;
     const std::size_t other = other_of_cycle(i);
-    if (system_->rests(system_.door(), i, other)) return i;
-    const bool rests = other != no_guard && system_->rests(system_.door(), other, i);
+    if (system_->rests(system_.adapter(), i, other)) return i;
+    const bool rests = other != no_guard && system_->rests(system_.adapter(), other, i);
     return rests ? other : no_guard;
 }
 
@@ -271,7 +271,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     if (bank_.keeps_rows()) error += error_by_rounding(bank_[i].intervals.interval());
     const double t = step_.time(ahead);
     X after = before;
-    const Mode mode_after = system_->rest(system_.door(), i, mode, t, after);
+    const Mode mode_after = system_->rest(system_.adapter(), i, mode, t, after);
     ++run_.statistics.events;
     record({.t = t,
             .kind = EventKind::accumulation,

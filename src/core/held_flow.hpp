@@ -11,11 +11,11 @@
 
 namespace ricochet::detail {
 
-/// The flow of a system with some of its components at zero; its own door.
+/// The flow of a system with some of its components at zero; its own adapter.
 template <class X>
 struct HeldFlow {
     const SystemTable<X>* system = nullptr;
-    void* door = nullptr;
+    void* adapter = nullptr;
     boost::container::small_vector<std::size_t, 8> components{};
 
     /// Sets the rates of the components to zero.
@@ -25,10 +25,10 @@ struct HeldFlow {
             if (c < dxdt.size()) dxdt[c] = 0;
         }
     }
-    static bool flow(void* door, Mode mode, double t, const X& x, X& dxdt)
+    static bool flow(void* adapter, Mode mode, double t, const X& x, X& dxdt)
     {
-        const HeldFlow& held = *static_cast<const HeldFlow*>(door);
-        const bool fits = held.system->flow(held.door, mode, t, x, dxdt);
+        const HeldFlow& held = *static_cast<const HeldFlow*>(adapter);
+        const bool fits = held.system->flow(held.adapter, mode, t, x, dxdt);
         held.stop(dxdt);
         return fits;
     }

@@ -36,20 +36,20 @@ namespace ricochet::detail {
 /// Whether the run of a system uses the loop for a single guard whose checks are never
 /// deferred.
 template <class X>
-[[nodiscard]] bool has_single_guard(const RunSetup<X>& setup)
+[[nodiscard]] bool has_single_guard(const RunBindings<X>& setup)
 {
     return fixed_size<X>() > 0 && !defers(setup.detector, *setup.system) &&
-           setup.system->guard_count(setup.door) == 1;
+           setup.system->guard_count(setup.adapter) == 1;
 }
 
 /// A loop together with its setup; it continues after exceptions from the system.
 template <class X>
 struct KeptSetup {
-    RunSetup<X> kept;
+    RunBindings<X> kept;
 };
 template <class X, bool single>
 struct KeptLoop final : KeptSetup<X>, Loop<X, single> {
-    KeptLoop(const RunSetup<X>& setup, const X& x0, const Options& options, bool resumable)
+    KeptLoop(const RunBindings<X>& setup, const X& x0, const Options& options, bool resumable)
         : KeptSetup<X>{setup}, Loop<X, single>(this->kept, x0, options)
     {
         if (resumable) this->keep_resumable();
@@ -57,7 +57,7 @@ struct KeptLoop final : KeptSetup<X>, Loop<X, single> {
 };
 
 template <class X>
-std::unique_ptr<LendingLoop<X>> make_kept_loop(const RunSetup<X>& setup, const X& x0,
+std::unique_ptr<LendingLoop<X>> make_kept_loop(const RunBindings<X>& setup, const X& x0,
                                                const Options& options, bool resumable)
 {
     if constexpr (fixed_size<X>() > 0) {
@@ -69,13 +69,13 @@ std::unique_ptr<LendingLoop<X>> make_kept_loop(const RunSetup<X>& setup, const X
 }
 
 template <class X>
-Owner<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0, const Options& options)
+Owner<AnyLoop<X>> make_loop(const RunBindings<X>& setup, const X& x0, const Options& options)
 {
     return Owner<AnyLoop<X>>(make_kept_loop(setup, x0, options, true).release());
 }
 
 template <class X>
-std::unique_ptr<LendingLoop<X>> make_lending_loop(const RunSetup<X>& setup, const X& x0,
+std::unique_ptr<LendingLoop<X>> make_lending_loop(const RunBindings<X>& setup, const X& x0,
                                                   const Options& options)
 {
     return make_kept_loop(setup, x0, options, false);
@@ -83,17 +83,18 @@ std::unique_ptr<LendingLoop<X>> make_lending_loop(const RunSetup<X>& setup, cons
 
 template <class X, bool single>
 struct KeptMonitor final : KeptSetup<X>, MonitorLoop<X, single> {
-    KeptMonitor(const RunSetup<X>& setup, const X& like, const Options& options, bool cuts_at_all)
+    KeptMonitor(const RunBindings<X>& setup, const X& like, const Options& options,
+                bool cuts_at_all)
         : KeptSetup<X>{setup}, MonitorLoop<X, single>(this->kept, like, options, cuts_at_all)
     {
     }
 };
 
 template <class X>
-Owner<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like, const Options& options,
-                                  bool cuts_at_all)
+Owner<AnyMonitor<X>> make_monitor(const RunBindings<X>& setup, const X& like,
+                                  const Options& options, bool cuts_at_all)
 {
-    RunSetup<X> shown = setup;
+    RunBindings<X> shown = setup;
     shown.kernel = &host_kernel<X>;
     if constexpr (fixed_size<X>() > 0) {
         if (has_single_guard(setup)) {
@@ -105,7 +106,7 @@ Owner<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like, const
 }
 
 template <class X>
-Run<X> run_whole(const RunSetup<X>& setup, const X& x0, const Options& options)
+Run<X> run_whole(const RunBindings<X>& setup, const X& x0, const Options& options)
 {
     if constexpr (fixed_size<X>() > 0) {
         if (has_single_guard(setup)) return Loop<X, true>(setup, x0, options).take();
@@ -114,7 +115,7 @@ Run<X> run_whole(const RunSetup<X>& setup, const X& x0, const Options& options)
 }
 
 template <class X>
-void run_whole(const RunSetup<X>& setup, const X& x0, const Options& options,
+void run_whole(const RunBindings<X>& setup, const X& x0, const Options& options,
                void (*take)(void* out, const Run<X>& run), void* out)
 {
     if constexpr (fixed_size<X>() > 0) {
@@ -127,7 +128,7 @@ void run_whole(const RunSetup<X>& setup, const X& x0, const Options& options,
 
 /// Kernel of the quiet runs of a set-up: its own, or that of one of the library's methods.
 template <class X>
-QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
+QuietKernel<X> quiet_kernel(const RunBindings<X>& setup) noexcept
 {
     const SystemTable<X>& system = *setup.system;
     if (system.phases) return nullptr;
@@ -144,18 +145,18 @@ QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept
 
 }  // namespace ricochet::detail
 
-#define RICOCHET_CORE(...)                                                                        \
-    namespace ricochet::detail {                                                                  \
-    using CoreStateHere = __VA_ARGS__;                                                            \
-    template Owner<AnyLoop<CoreStateHere>> make_loop(const RunSetup<CoreStateHere>&,              \
-                                                     const CoreStateHere&, const Options&);       \
-    template std::unique_ptr<LendingLoop<CoreStateHere>> make_lending_loop(                       \
-        const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&);                    \
-    template Owner<AnyMonitor<CoreStateHere>> make_monitor(const RunSetup<CoreStateHere>&,        \
-                                                           const CoreStateHere&, const Options&,  \
-                                                           bool);                                 \
-    template Run<CoreStateHere> run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&,   \
-                                          const Options&);                                        \
-    template void run_whole(const RunSetup<CoreStateHere>&, const CoreStateHere&, const Options&, \
-                            void (*)(void*, const Run<CoreStateHere>&), void*);                   \
+#define RICOCHET_CORE(...)                                                                         \
+    namespace ricochet::detail {                                                                   \
+    using CoreStateHere = __VA_ARGS__;                                                             \
+    template Owner<AnyLoop<CoreStateHere>> make_loop(const RunBindings<CoreStateHere>&,            \
+                                                     const CoreStateHere&, const Options&);        \
+    template std::unique_ptr<LendingLoop<CoreStateHere>> make_lending_loop(                        \
+        const RunBindings<CoreStateHere>&, const CoreStateHere&, const Options&);                  \
+    template Owner<AnyMonitor<CoreStateHere>> make_monitor(const RunBindings<CoreStateHere>&,      \
+                                                           const CoreStateHere&, const Options&,   \
+                                                           bool);                                  \
+    template Run<CoreStateHere> run_whole(const RunBindings<CoreStateHere>&, const CoreStateHere&, \
+                                          const Options&);                                         \
+    template void run_whole(const RunBindings<CoreStateHere>&, const CoreStateHere&,               \
+                            const Options&, void (*)(void*, const Run<CoreStateHere>&), void*);    \
     }

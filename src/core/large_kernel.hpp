@@ -35,10 +35,10 @@ class LargeKernel {
     typedef double Four __attribute__((vector_size(32)));
 
     /// Writes dx/ds at offset s and state `step.at` into `rate`.
-    [[gnu::always_inline]] static void flow(void* door, State& step, double s, X& rate)
+    [[gnu::always_inline]] static void flow(void* adapter, State& step, double s, X& rate)
     {
         ++step.flow_calls;
-        step.flow_fits &= step.flow(door, step.mode, step.flow_time(s), step.at, rate);
+        step.flow_fits &= step.flow(adapter, step.mode, step.flow_time(s), step.at, rate);
         if (step.backward) {
             for (double& each : rate) each = -each;
         }
@@ -94,23 +94,23 @@ class LargeKernel {
     }
 
     template <std::size_t... I>
-    static void take_stages([[maybe_unused]] void* door, [[maybe_unused]] State& step,
+    static void take_stages([[maybe_unused]] void* adapter, [[maybe_unused]] State& step,
                             [[maybe_unused]] double h, [[maybe_unused]] X* k,
                             std::index_sequence<I...>)
     {
         ((combine<typename Method::template Stage<I + 1>, I, false>(step, h, h * Tableau::c[I + 1],
                                                                     k, step.at),
-          flow(door, step, h * Tableau::c[I + 1], k[I])),
+          flow(adapter, step, h * Tableau::c[I + 1], k[I])),
          ...);
     }
 
     /// w after a step of length h, from stages that are kept in `k`.
-    static void depart(void* door, State& step, double h, X* k, X& w)
+    static void depart(void* adapter, State& step, double h, X* k, X& w)
     {
         for (std::size_t i = 0; i < last; ++i) {
             if (k[i].size() != step.x0.size()) k[i] = step.zero;
         }
-        take_stages(door, step, h, k, std::make_index_sequence<last>{});
+        take_stages(adapter, step, h, k, std::make_index_sequence<last>{});
         combine<typename Method::Weights, last, true>(step, h, h, k, w);
     }
 
@@ -251,19 +251,19 @@ class LargeKernel {
 
     /// Takes a step. Returns the largest ratio of error, 0 without an estimate; NaN if not finite.
     template <bool with_error>
-    RICOCHET_WIDE static double go(void* door, State& step, double h, double rtol, double atol)
+    RICOCHET_WIDE static double go(void* adapter, State& step, double h, double rtol, double atol)
     {
         step.h = h;
         step.has_middle = false;
         step.asked_alone = 0;
-        depart(door, step, h, step.stages.data(), step.w);
-        if constexpr (Method::fsal) flow(door, step, h, step.w_rate1);
+        depart(adapter, step, h, step.stages.data(), step.w);
+        if constexpr (Method::fsal) flow(adapter, step, h, step.w_rate1);
         const std::size_t n = step.x0.size();
         if constexpr (!Method::fsal) {
             for (std::size_t i = 0; i < n; ++i) {
                 step.at[i] = step.x0[i] + (h * step.rate0[i] + (step.w[i] + step.remainder[i]));
             }
-            flow(door, step, h, step.rate1);
+            flow(adapter, step, h, step.rate1);
         }
         const Pass<with_error> some(step, h, rtol, atol);
         Four worst{};
@@ -276,22 +276,22 @@ class LargeKernel {
         return last_lost == 0 ? last_worst : std::numeric_limits<double>::quiet_NaN();
     }
 
-    static bool take(void* door, State& step, double h)
+    static bool take(void* adapter, State& step, double h)
     {
-        const double ratio = go<false>(door, step, h, 0, 0);
+        const double ratio = go<false>(adapter, step, h, 0, 0);
         return ratio == ratio;
     }
 
-    static double attempt(void* door, State& step, double h, double rtol, double atol)
+    static double attempt(void* adapter, State& step, double h, double rtol, double atol)
     {
-        return go<true>(door, step, h, rtol, atol);
+        return go<true>(adapter, step, h, rtol, atol);
     }
 
-    static void depart_only(void* door, State& step, double s, X& w, X& rate)
+    static void depart_only(void* adapter, State& step, double s, X& w, X& rate)
     {
-        depart(door, step, s, step.large.probed.data(), w);
+        depart(adapter, step, s, step.large.probed.data(), w);
         if constexpr (Method::fsal) {
-            flow(door, step, s, rate);
+            flow(adapter, step, s, rate);
             for (std::size_t i = 0; i < rate.size(); ++i) rate[i] -= step.rate0[i];
         }
     }

@@ -36,7 +36,7 @@ namespace ricochet::detail {
 
 /// Kernel of the quiet runs of a set-up; null: every step is one of the loop.
 template <class X>
-[[nodiscard]] QuietKernel<X> quiet_kernel(const RunSetup<X>& setup) noexcept;
+[[nodiscard]] QuietKernel<X> quiet_kernel(const RunBindings<X>& setup) noexcept;
 
 template <class X, bool single>
 class Loop : public LendingLoop<X>, private EventEngine<X, single> {
@@ -44,7 +44,7 @@ class Loop : public LendingLoop<X>, private EventEngine<X, single> {
 
 public:
     /// Keeps a reference to `setup`.
-    Loop(const RunSetup<X>& setup, const X& x0, const Options& options)
+    Loop(const RunBindings<X>& setup, const X& x0, const Options& options)
         : Engine(setup, x0, checked(setup, options, x0)),
           components_(static_cast<std::size_t>(x0.size())),
           quiet_(quiet_kernel(setup))
@@ -74,13 +74,13 @@ public:
         if (setup.detector.check) {
             const double smallest = error_controlled_ ? options_.h_min : options_.step;
             const double largest = error_controlled_ ? options_.h_max : options_.step;
-            setup.detector.check(setup.detecting, setup.door, x0, smallest, largest);
+            setup.detector.check(setup.detecting, setup.adapter, x0, smallest, largest);
         }
         if (guarded_) this->arm_at_start(!options_.continues);
         if (endless_ && !this->may_end()) throw_endless(options.t_end);
         if (guarded_ || timed_) this->settle_all();
         if (phases_) {
-            if (phases_->list_in) phases_->list_in(system_.door(), run_.phases);
+            if (phases_->list_in) phases_->list_in(system_.adapter(), run_.phases);
             review_phase(false);
         }
     }
@@ -254,7 +254,7 @@ private:
     // --- set-up ---
 
     /// The options, if they and the start are valid.
-    [[nodiscard]] static const Options& checked(const RunSetup<X>& setup, const Options& options,
+    [[nodiscard]] static const Options& checked(const RunBindings<X>& setup, const Options& options,
                                                 const X& x0);
 
     [[nodiscard]] std::vector<RunProperty> properties() const;
@@ -591,7 +591,7 @@ private:
         const double t = step_.start().value;
         const bool goes_on =
             !ended_ && phases_->goes_on &&
-            phases_->goes_on(system_.door(), step_.mode(), t, step_.x0(), has_advanced);
+            phases_->goes_on(system_.adapter(), step_.mode(), t, step_.x0(), has_advanced);
         if (!goes_on) change_phase(has_advanced);
     }
     void change_phase(bool has_advanced);

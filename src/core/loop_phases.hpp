@@ -14,15 +14,15 @@ void Loop<X, single>::change_phase(bool has_advanced)
         X x = step_.x0();
         const double t = step_.start().value;
         const PhaseVerdict verdict =
-            ended_ ? phases_->give_up(phases_->door,
+            ended_ ? phases_->give_up(phases_->adapter,
                                       {run_.outcome, run_.guard, t, step_.mode(), step_.x0()}, x)
                    : phases_->review(
-                         phases_->door,
+                         phases_->adapter,
                          {t, step_.mode(), step_.x0(), step_.rate0(), h_next_, has_advanced}, x);
         if (verdict.kind == PhaseVerdict::Kind::stands) break;
         if (verdict.kind == PhaseVerdict::Kind::ends) {
             end(verdict.outcome);
-            run_.reason = phases_->reason(phases_->door);
+            run_.reason = phases_->reason(phases_->adapter);
             break;
         }
         continue_from(x, verdict.mode, verdict.h);
@@ -36,7 +36,7 @@ template <class X, bool single>
 std::vector<double> Loop<X, single>::reaction_at(const PhasePlace<X>& place) const
 {
     std::vector<double> r;
-    phases_->reaction(system_.door(), place, r);
+    phases_->reaction(system_.adapter(), place, r);
     return r;
 }
 

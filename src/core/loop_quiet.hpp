@@ -41,7 +41,7 @@ inline bool Loop<X, single>::run_quietly_from_here()
 template <class X, bool single>
 inline void Loop<X, single>::run_quietly(QuietRun& quiet)
 {
-    quiet_(system_.door(), step_.lend(), quiet);
+    quiet_(system_.adapter(), step_.lend(), quiet);
     take_over(quiet);
     if (quiet.why != QuietEnd::due) end_quiet_run(quiet);
 }

@@ -65,7 +65,7 @@ void Loop<X, single>::start_at(double t, const X& x, Mode mode)
     change_due_ = on_change_ = false;
     if (phases_) {
         X start = x;
-        mode = phases_->enter(phases_->door, mode, t, start);
+        mode = phases_->enter(phases_->adapter, mode, t, start);
         step_.restart(Instant{t, 0}, start, mode);
     } else {
         step_.restart(Instant{t, 0}, x, mode);

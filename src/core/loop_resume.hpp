@@ -62,7 +62,7 @@ template <class X, bool single>
 void Loop<X, single>::mark_phases()
 {
     mark_everything();
-    phases_->save(phases_->door, mark_->phases);
+    phases_->save(phases_->adapter, mark_->phases);
 }
 
 template <class X, bool single>
@@ -147,7 +147,7 @@ void Loop<X, single>::go_back_to_mark()
         step_.put_back_rate();
     }
     h_next_ = mark.h_next;
-    if (phases_) phases_->restore(phases_->door, mark.phases);
+    if (phases_) phases_->restore(phases_->adapter, mark.phases);
     newly_armed_ = mark.newly_armed;
     if (mark.tentative > 0) {
         const auto& first = planner_->steps()[0];

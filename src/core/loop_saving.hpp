@@ -86,10 +86,10 @@ template <class Visitor>
 void Loop<X, single>::visit_phases(Visitor&& visit)
 {
     std::vector<double> memory;
-    phases_->save(phases_->door, memory);
+    phases_->save(phases_->adapter, memory);
     for (double& number : memory) visit(number);
     if constexpr (!std::remove_cvref_t<Visitor>::saves) {
-        phases_->restore(phases_->door, memory);
+        phases_->restore(phases_->adapter, memory);
     }
 }
 

@@ -6,7 +6,7 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline const Options& Loop<X, single>::checked(const RunSetup<X>& setup, const Options& options,
+inline const Options& Loop<X, single>::checked(const RunBindings<X>& setup, const Options& options,
                                                const X& x0)
 {
     validate_but_for_end(options, !setup.error_controlled, "integrate");
@@ -29,7 +29,7 @@ inline std::vector<RunProperty> Loop<X, single>::properties() const
 {
     const int order = setup_.method_by_name ? setup_.kernel->order : setup_.order;
     const std::string of_order = order > 0 ? " of order " + std::to_string(order) : "";
-    return properties_of_run({.system = system_->name(system_.door()),
+    return properties_of_run({.system = system_->name(system_.adapter()),
                               .stepping = plain_type_name(setup_.stepping) + of_order,
                               .detector = plain_type_name(finders_.detector.type),
                               .locator = plain_type_name(finders_.locator.type),

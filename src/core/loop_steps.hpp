@@ -82,7 +82,7 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
     run_.mode = this->shown(step_.mode());
     this->collect_counts();
     this->list_armed_beyond();
-    if (phases_ && phases_->complete) phases_->complete(system_.door(), run_);
+    if (phases_ && phases_->complete) phases_->complete(system_.adapter(), run_);
     if (ended_) {
         if (next_sample_ < options_.sample_times.size()) emit_last_samples();
         record_restart();

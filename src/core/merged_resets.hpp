@@ -56,7 +56,7 @@ public:
     {
         apply_resets(system, bank, set, before, stands);
         if (!system->after_set || conflict_.first != no_guard) return;
-        mode_ = system->after_set(system.door(), FiredGuards(set.fired, set.on_time), set.mode,
+        mode_ = system->after_set(system.adapter(), FiredGuards(set.fired, set.on_time), set.mode,
                                   set.t, before, after_);
     }
 
@@ -66,7 +66,7 @@ public:
                                  X& x, const X& before)
     {
         const X from = x;
-        mode_ = ask(i, mode, [&] { return system->reset(system.door(), i, mode, t, x); });
+        mode_ = ask(i, mode, [&] { return system->reset(system.adapter(), i, mode, t, x); });
         if (x.size() != from.size()) {
             assign(after_, x);
             return true;
@@ -80,7 +80,7 @@ public:
 
     static void tell_direction(const SystemAt<X>& system, Crossing direction)
     {
-        if (system->tell_direction) system->tell_direction(system.door(), direction);
+        if (system->tell_direction) system->tell_direction(system.adapter(), direction);
     }
 
     [[nodiscard]] X& after() noexcept { return after_; }
@@ -119,14 +119,15 @@ private:
             const std::size_t i = fired[0];
             if (!system->reset || !bank[i].info.resets) return;
             tell_direction(system, stands.direction(i));
-            mode_ = ask(i, mode, [&] { return system->reset(system.door(), i, mode, t, after_); });
+            mode_ =
+                ask(i, mode, [&] { return system->reset(system.adapter(), i, mode, t, after_); });
             return;
         }
         const auto resets = [&](std::size_t i) { return system->resets() && bank[i].info.resets; };
         if (system->reset_set && std::any_of(fired.begin(), fired.end(), resets)) {
             const FiredGuards set(fired, on_time);
             mode_ = ask(fired[0], mode,
-                        [&] { return system->reset_set(system.door(), set, mode, t, after_); });
+                        [&] { return system->reset_set(system.adapter(), set, mode, t, after_); });
             return;
         }
         members_ = {};
@@ -139,8 +140,8 @@ private:
                 tell_direction(system, stands.direction(member.who));
             return ask(member.who, in, [&] {
                 return member.who == time_event_reset
-                           ? system->time_reset(system.door(), in, t, x)
-                           : system->reset(system.door(), member.who, in, t, x);
+                           ? system->time_reset(system.adapter(), in, t, x)
+                           : system->reset(system.adapter(), member.who, in, t, x);
             });
         };
         if (members_.size() == 1) {

@@ -49,7 +49,8 @@ class MonitorLoop : public AnyMonitor<X>, private EventEngine<X, single> {
 
 public:
     /// Keeps a reference to `setup`.
-    MonitorLoop(const RunSetup<X>& setup, const X& like, const Options& options, bool cuts_at_all)
+    MonitorLoop(const RunBindings<X>& setup, const X& like, const Options& options,
+                bool cuts_at_all)
         : Engine(setup, like, options), components_(static_cast<std::size_t>(like.size()))
     {
         this->who_ = who;
@@ -59,7 +60,7 @@ public:
         }
         if (guarded_) this->refuse_bad_guards();
         if (setup.detector.check) {
-            setup.detector.check(setup.detecting, setup.door, like, 0, Engine::infinity);
+            setup.detector.check(setup.detecting, setup.adapter, like, 0, Engine::infinity);
         }
         cut_.before = cut_.after = like;
         cut_.fired.reserve(std::max<std::size_t>(bank_.size(), 1));
@@ -520,7 +521,7 @@ private:
 
     [[nodiscard]] std::vector<RunProperty> properties() const
     {
-        return {{"monitor of", system_->name(system_.door())},
+        return {{"monitor of", system_->name(system_.adapter())},
                 {"detector", plain_type_name(finders_.detector.type)},
                 {"locator", plain_type_name(finders_.locator.type)},
                 {"guards", std::to_string(bank_.size())},

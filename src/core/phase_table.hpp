@@ -21,9 +21,9 @@ namespace ricochet::detail {
 template <class X>
 struct Stepper {
     const StepKernel<X>* kernel = nullptr;
-    void* door = nullptr;  ///< first argument of the kernel's functions
-    /// Flow for kernels that call it by pointer, with that door.
-    bool (*flow)(void* door, Mode mode, double t, const X& x, X& dxdt) = nullptr;
+    void* adapter = nullptr;  ///< first argument of the kernel's functions
+    /// Flow for kernels that call it by pointer, with that adapter.
+    bool (*flow)(void* adapter, Mode mode, double t, const X& x, X& dxdt) = nullptr;
 };
 
 /// What has happened at one instant, before the phases decide.
@@ -88,43 +88,43 @@ struct PhaseVerdict {
 
 template <class X>
 struct PhaseTable {
-    using Door = void*;
+    using SystemAdapter = void*;
 
-    Door door = nullptr;  ///< first argument of the functions
+    SystemAdapter adapter = nullptr;  ///< first argument of the functions
 
     /// The number of guards of the system. Those behind them belong to the phases: their crossings
     /// cut steps, and are no events by themselves.
-    std::size_t (*own_guards)(Door) = nullptr;
-    Stepper<X> (*stepper)(Door, Mode) = nullptr;
+    std::size_t (*own_guards)(SystemAdapter) = nullptr;
+    Stepper<X> (*stepper)(SystemAdapter, Mode) = nullptr;
     /// The mode in which a run starts at (t, x) in a mode of the system. May move x onto a surface.
-    Mode (*enter)(Door, Mode, double t, X& x) = nullptr;
+    Mode (*enter)(SystemAdapter, Mode, double t, X& x) = nullptr;
     /// The mode after a set. May move x⁺ onto a surface.
-    Mode (*decide)(Door, const PhaseSet<X>&, X& after) = nullptr;
+    Mode (*decide)(SystemAdapter, const PhaseSet<X>&, X& after) = nullptr;
     /// Changes of reactions at the last set, by reaction.
-    std::span<const ReactionChange> (*changes)(Door) = nullptr;
+    std::span<const ReactionChange> (*changes)(SystemAdapter) = nullptr;
     /// Whether the last set has an event of its own for a guard of the system: not for one that
     /// stands for a reaction whose change is recorded under another guard.
-    bool (*records)(Door, std::size_t guard) = nullptr;
+    bool (*records)(SystemAdapter, std::size_t guard) = nullptr;
     /// Whether the phase goes on after a step, as far as a quick test tells; else `review` decides.
     /// Null: it always does.
     /// @param has_advanced  as in `PhaseStep`
-    bool (*goes_on)(Door, Mode, double t, const X& x, bool has_advanced) = nullptr;
+    bool (*goes_on)(SystemAdapter, Mode, double t, const X& x, bool has_advanced) = nullptr;
     /// The phase after a step. May move x onto a surface.
-    PhaseVerdict (*review)(Door, const PhaseStep<X>&, X& x) = nullptr;
+    PhaseVerdict (*review)(SystemAdapter, const PhaseStep<X>&, X& x) = nullptr;
     /// The phase where the run would end. May move x onto a surface.
-    PhaseVerdict (*give_up)(Door, const PhaseEnd<X>&, X& x) = nullptr;
+    PhaseVerdict (*give_up)(SystemAdapter, const PhaseEnd<X>&, X& x) = nullptr;
     /// A sentence about the end that the phases have given to the run, or an empty one.
-    std::string_view (*reason)(Door) = nullptr;
+    std::string_view (*reason)(SystemAdapter) = nullptr;
     /// Moves the list of phases to `phases`, where it goes on. This function and the two below may
     /// be null.
-    void (*list_in)(Door, std::vector<MotionPhase>& phases) = nullptr;
+    void (*list_in)(SystemAdapter, std::vector<MotionPhase>& phases) = nullptr;
     /// Writes the reactions at a place in the current step, or in one that has just ended.
-    void (*reaction)(Door, const PhasePlace<X>&, std::vector<double>& r) = nullptr;
+    void (*reaction)(SystemAdapter, const PhasePlace<X>&, std::vector<double>& r) = nullptr;
     /// Adds to the result of the run what the phases know of it.
-    void (*complete)(Door, Run<X>& run) = nullptr;
+    void (*complete)(SystemAdapter, Run<X>& run) = nullptr;
     /// The numbers besides time, mode and state on which the future of the run depends.
-    void (*save)(Door, std::vector<double>& memory) = nullptr;
-    void (*restore)(Door, const std::vector<double>& memory) = nullptr;
+    void (*save)(SystemAdapter, std::vector<double>& memory) = nullptr;
+    void (*restore)(SystemAdapter, const std::vector<double>& memory) = nullptr;
 };
 
 }  // namespace ricochet::detail

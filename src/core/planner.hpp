@@ -363,10 +363,10 @@ private:
     {
         GuardBound at{.distance = sign_of(side) * check.value, .speed = 0, .acceleration = 0};
         if (!bounded_) return at;
-        const double l = system_->lipschitz(system_.door(), i);
-        at.speed = l * system_->speed_bound(system_.door(), i, mode, check.t, *check.x);
+        const double l = system_->lipschitz(system_.adapter(), i);
+        at.speed = l * system_->speed_bound(system_.adapter(), i, mode, check.t, *check.x);
         at.acceleration =
-            l * system_->acceleration_bound(system_.door(), i, mode, check.t, *check.x);
+            l * system_->acceleration_bound(system_.adapter(), i, mode, check.t, *check.x);
         if (detector_->checks_bounds && !(at.speed >= 0 && at.acceleration >= 0) && !wrong_) {
             blame(i, check, check, at.speed >= 0 ? at.acceleration : at.speed);
         }
@@ -404,7 +404,7 @@ private:
         // Gates predict the future only, not the past.
         if (!detector_->horizon || backward_ || !meter_.asks()) return 0;
         const GateAnswer answer = meter_.time_network(
-            [&] { return detector_->horizon(self_, system_.door(), mode, at.t, *at.x); });
+            [&] { return detector_->horizon(self_, system_.adapter(), mode, at.t, *at.x); });
         ++asked_;
         outside_ += answer.outside ? 1 : 0;
         if (answer.cleared > 0) meter_.note_cleared();
@@ -523,7 +523,8 @@ private:
             check = place(k, step);
             check.exact = false;
             ++counts.bound_calls;
-            check.value = system_->upper_bound(system_.door(), i, step.mode(), check.t, *check.x);
+            check.value =
+                system_->upper_bound(system_.adapter(), i, step.mode(), check.t, *check.x);
             check.bound = bound(i, check, step.mode(), Side::below);
             return check.value < 0 ? std::optional(check) : std::nullopt;
         }
@@ -534,7 +535,8 @@ private:
         check.value = 0;
         if (system_->lower_bound) {
             ++counts.bound_calls;
-            check.value = system_->lower_bound(system_.door(), i, step.mode(), check.t, *check.x);
+            check.value =
+                system_->lower_bound(system_.adapter(), i, step.mode(), check.t, *check.x);
         }
         if (detector_->level && meter_.asks()) {
             check.value = std::max(check.value, ask_level(i, check, step.mode()));
@@ -547,7 +549,7 @@ private:
     [[nodiscard]] double ask_level(std::size_t i, const Check& at, Mode mode)
     {
         const GateAnswer answer = meter_.time_network([&] {
-            return detector_->level(self_, system_.door(), {i, mode}, at.t, *at.x);
+            return detector_->level(self_, system_.adapter(), {i, mode}, at.t, *at.x);
         });
         ++asked_;
         outside_ += answer.outside ? 1 : 0;

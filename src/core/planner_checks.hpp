@@ -75,12 +75,12 @@ inline void Planner<X, single>::check_bound(std::size_t i, const Check& check, M
                                             const Bank& bank)
 {
     if (!bounded_) return;
-    void* const door = system_.door();
+    void* const adapter = system_.adapter();
     if (system_->lower_bound && bank[i].side == Side::above) {
-        check_against(system_->lower_bound(door, i, mode, check.t, *check.x), i, check, bank);
+        check_against(system_->lower_bound(adapter, i, mode, check.t, *check.x), i, check, bank);
     }
     if (system_->upper_bound && bank[i].side == Side::below) {
-        check_against(system_->upper_bound(door, i, mode, check.t, *check.x), i, check, bank);
+        check_against(system_->upper_bound(adapter, i, mode, check.t, *check.x), i, check, bank);
     }
 }
 

@@ -30,13 +30,13 @@ protected:
     SampledGuards(const SystemAt<X>& system, const BankRules& rules, bool backward)
         : system_(system), rules_(rules), backward_(backward)
     {
-        const std::size_t count = system->guard_count(system.door());
+        const std::size_t count = system->guard_count(system.adapter());
         if (count == 0) return;
         behind_.resize(count);
         records_.resize(count);
         at_rest_.resize(count);
         for (std::size_t i = 0; i < count; ++i) {
-            records_[i].info = system->info(system.door(), i);
+            records_[i].info = system->info(system.adapter(), i);
         }
         heed_enabled();
     }
@@ -98,7 +98,7 @@ protected:
     void sample_values(Mode mode, double t, const X& x, std::uint64_t& calls, Doubles& g)
     {
         if (size() == 0) return;
-        system_->guards(system_.door(), mode, t, x, all(g));
+        system_->guards(system_.adapter(), mode, t, x, all(g));
         calls += size();
     }
 
@@ -110,7 +110,7 @@ protected:
         if (system_->rates) {
             rates_together(at, rates);
         } else if (system_->each_rate && !selective_ && !backward_) {
-            system_->each_rate(system_.door(), at.motion, all(rates));
+            system_->each_rate(system_.adapter(), at.motion, all(rates));
         } else if (!system_->each_rate && !system_->guard_alone) {
             const bool is_cut =
                 system_.is_near_end(at.motion.t, tolerances::of_difference * at.scale);
@@ -148,9 +148,9 @@ protected:
     /// Rates of all guards from the system in one call.
     void rates_together(const SamplePoint<X>& at, Doubles& rates)
     {
-        void* const door = system_.door();
-        if (!backward_) return system_->rates(door, at.motion, all(rates));
-        system_->rates(door, {at.motion.mode, at.motion.t, at.motion.x, negated(at.motion.s)},
+        void* const adapter = system_.adapter();
+        if (!backward_) return system_->rates(adapter, at.motion, all(rates));
+        system_->rates(adapter, {at.motion.mode, at.motion.t, at.motion.x, negated(at.motion.s)},
                        all(rates));
         for (std::size_t i = 0; i < size(); ++i) rates[i] = -rates[i];
     }
@@ -162,9 +162,10 @@ protected:
         const double ahead = backward_ ? -delta : delta;
         if (there_.size() != at.motion.x.size()) there_ = at.motion.x;
         detail::move(there_, at.motion.x, delta, at.motion.s);
-        system_->guards(system_.door(), at.motion.mode, at.motion.t + ahead, there_, all(rates));
+        system_->guards(system_.adapter(), at.motion.mode, at.motion.t + ahead, there_, all(rates));
         detail::move(there_, at.motion.x, -delta, at.motion.s);
-        system_->guards(system_.door(), at.motion.mode, at.motion.t - ahead, there_, all(behind_));
+        system_->guards(system_.adapter(), at.motion.mode, at.motion.t - ahead, there_,
+                        all(behind_));
         for (std::size_t i = 0; i < size(); ++i) {
             rates[i] = records_[i].info.boolean ? 0 : (rates[i] - behind_[i]) / (2 * delta);
         }
@@ -179,7 +180,7 @@ protected:
         if (there_.size() != at.motion.x.size()) there_ = at.motion.x;
         const auto guards = [&](double later, Doubles& g) {
             detail::move(there_, at.motion.x, backward_ ? -later : later, at.motion.s);
-            system_->guards(system_.door(), at.motion.mode, at.motion.t + later, there_, all(g));
+            system_->guards(system_.adapter(), at.motion.mode, at.motion.t + later, there_, all(g));
         };
         guards(delta, behind_);
         for (std::size_t i = 0; i < size(); ++i) rates[i] = 4 * behind_[i] - 3 * rates[i];
@@ -209,8 +210,8 @@ protected:
             detail::move(there_, at.motion.x, s, at.motion.s);
             for (std::size_t i = 0; i < size(); ++i) {
                 if (is_rateless(i)) continue;
-                g[i] =
-                    system_->guard(system_.door(), i, at.motion.mode, at.motion.t + later, there_);
+                g[i] = system_->guard(system_.adapter(), i, at.motion.mode, at.motion.t + later,
+                                      there_);
             }
         };
         sample(delta, ahead, rates);

@@ -43,7 +43,7 @@ public:
           system_(system),
           own_kernel_(&kernel),
           kernel_(&kernel),
-          stepping_(system.door()),
+          stepping_(system.adapter()),
           state_(x),
           kept_rate_(state_.zero),
           unused_rate_(state_.zero),
@@ -332,7 +332,7 @@ public:
     void flow_in(Mode mode, double t, const X& x, X& dxdt) const
     {
         ++state_.flow_calls;
-        state_.flow_fits &= system_->flow(system_.door(), mode, t, x, dxdt);
+        state_.flow_fits &= system_->flow(system_.adapter(), mode, t, x, dxdt);
         if (state_.backward) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
     }
 
@@ -361,7 +361,7 @@ public:
     {
         const bool any = !components.empty();
         held_.system = free_.operator->();
-        held_.door = free_.door();
+        held_.adapter = free_.adapter();
         held_.components.assign(components.begin(), components.end());
         system_ = any ? SystemAt<X>(HeldFlow<X>::table, &held_, free_.span()) : free_;
         const StepKernel<X>* const before = kernel_;
@@ -369,10 +369,10 @@ public:
             change_stepper();
         } else {
             state_.flow = system_->flow;
-            stepping_ = system_.door();
+            stepping_ = system_.adapter();
             kernel_ = any ? &kernel_by_pointer(*own_kernel_, state_.x0.size()) : own_kernel_;
         }
-        if (kernel_ != before && kernel_->renew) kernel_->renew(free_.door());
+        if (kernel_ != before && kernel_->renew) kernel_->renew(free_.adapter());
         held_.stop(state_.rate0);
     }
     [[nodiscard]] std::span<const std::size_t> held() const noexcept
@@ -387,7 +387,7 @@ public:
     {
         ++state_.flow_calls;
         state_.flow_fits &=
-            free_->flow(free_.door(), state_.mode, state_.flow_at(inside(t)), x, dxdt);
+            free_->flow(free_.adapter(), state_.mode, state_.flow_at(inside(t)), x, dxdt);
         if (state_.backward) for_components([&](auto i) { dxdt[i] = -dxdt[i]; });
     }
 
@@ -789,10 +789,10 @@ private:
     /// Steps are taken by the stepper of the mode from here on.
     [[gnu::cold, gnu::noinline]] void change_stepper()
     {
-        const Stepper<X> stepper = system_->phases->stepper(system_->phases->door, state_.mode);
+        const Stepper<X> stepper = system_->phases->stepper(system_->phases->adapter, state_.mode);
         const bool changes = kernel_ != stepper.kernel;
         kernel_ = stepper.kernel;
-        stepping_ = stepper.door;
+        stepping_ = stepper.adapter;
         state_.flow = stepper.flow;
         if (changes && kernel_->renew) kernel_->renew(stepping_);
     }

@@ -156,10 +156,11 @@ private:
     {
         const double t = task.step.time(s);
         const std::size_t i = task.guard.which();
-        void* const door = system_.door();
-        const double l = system_->lipschitz(door, i);
-        const double speed = system_->speed_bound(door, i, task.guard.mode(), t, x);
-        const double acceleration = system_->acceleration_bound(door, i, task.guard.mode(), t, x);
+        void* const adapter = system_.adapter();
+        const double l = system_->lipschitz(adapter, i);
+        const double speed = system_->speed_bound(adapter, i, task.guard.mode(), t, x);
+        const double acceleration =
+            system_->acceleration_bound(adapter, i, task.guard.mode(), t, x);
         return {.s = s,
                 .bound = {.distance = sign_of(task.side) * value,
                           .speed = l * speed,

@@ -41,10 +41,10 @@ struct StageRates {
 
 /// One run with a law of a certain type.
 template <class Law>
-class Runner {
+class FaultLoop {
 public:
-    Runner(const StrikeSlipFault& fault, const RuptureOptions& options,
-           const FaultFriction& friction, const RateStateOptions& how)
+    FaultLoop(const StrikeSlipFault& fault, const RuptureOptions& options,
+              const FaultFriction& friction, const RateStateOptions& how)
         : fault_(fault),
           options_(options),
           how_(how),
@@ -392,10 +392,10 @@ RateStateRupture run(const StrikeSlipFault& fault, const RuptureOptions& options
 {
     if (friction.effect == DirectEffect::log) {
         using Law = RateStateLaw<evolution, DirectEffect::log>;
-        return Runner<Law>(fault, options, friction, how).run();
+        return FaultLoop<Law>(fault, options, friction, how).run();
     }
     using Law = RateStateLaw<evolution, DirectEffect::asinh>;
-    return Runner<Law>(fault, options, friction, how).run();
+    return FaultLoop<Law>(fault, options, friction, how).run();
 }
 
 }  // namespace

@@ -79,9 +79,9 @@ SliderState between(const SliderState& a, const SliderState& b, const SliderStat
 
 /// One run of a slider with a law of a certain type.
 template <class Law>
-class Runner {
+class SliderLoop {
 public:
-    Runner(const SpringSlider& slider, const SliderOptions& options)
+    SliderLoop(const SpringSlider& slider, const SliderOptions& options)
         : slider_(slider),
           options_(options),
           law_(slider.friction),
@@ -331,11 +331,11 @@ SliderRun run_slider(const SpringSlider& slider, const SliderState& start,
         detail::require_finite("run_slider", "start", component);
     }
     switch (slider.evolution) {
-        case StateEvolution::slip: return Runner<SlipLaw<>>(slider, options).run(start);
-        case StateEvolution::prz: return Runner<PrzLaw<>>(slider, options).run(start);
+        case StateEvolution::slip: return SliderLoop<SlipLaw<>>(slider, options).run(start);
+        case StateEvolution::prz: return SliderLoop<PrzLaw<>>(slider, options).run(start);
         case StateEvolution::ageing: break;
     }
-    return Runner<AgeingLaw<>>(slider, options).run(start);
+    return SliderLoop<AgeingLaw<>>(slider, options).run(start);
 }
 
 double slider_friction(const SpringSlider& slider, const SliderState& state)

@@ -189,11 +189,11 @@ template <class C>
 Stepper<C> ContactPhases<C>::stepper(Mode mode)
 {
     if (setup_.kinds.is_flight(mode)) {
-        return {&flight_, setup_.flight.door, table_.flow};
+        return {&flight_, setup_.flight.adapter, table_.flow};
     }
     // Where a step starts, the rate of its first one.
-    return {&contact_, this, [](void* door, Mode of, double t, const C& x, C& dxdt) {
-                ContactPhases& me = at(door);
+    return {&contact_, this, [](void* adapter, Mode of, double t, const C& x, C& dxdt) {
+                ContactPhases& me = at(adapter);
                 me.setup_.steps->mean_rate({own_mode(of), t, x.data()}, me.step_, dxdt.data());
                 return true;
             }};
@@ -236,19 +236,21 @@ void ContactPhases<C>::make_kernels()
     flight_.cross = nullptr;
     contact_.order = contact_.error_order = 1;
     contact_.end_rate = true;
-    contact_.take = [](void* door, StepState<C>& step, double h) { return at(door).take(step, h); };
-    contact_.attempt = [](void* door, StepState<C>& step, double h, double, double) {
-        return at(door).take(step, h) ? 0 : std::numeric_limits<double>::quiet_NaN();
+    contact_.take = [](void* adapter, StepState<C>& step, double h) {
+        return at(adapter).take(step, h);
     };
-    contact_.depart = [](void* door, StepState<C>& step, double s, C& w, C& rate) {
-        at(door).depart(step, s, w, rate);
+    contact_.attempt = [](void* adapter, StepState<C>& step, double h, double, double) {
+        return at(adapter).take(step, h) ? 0 : std::numeric_limits<double>::quiet_NaN();
+    };
+    contact_.depart = [](void* adapter, StepState<C>& step, double s, C& w, C& rate) {
+        at(adapter).depart(step, s, w, rate);
     };
     contact_.departure = [](void*, const StepState<C>& step, double s, C& w) {
         assign(w, step.w);
         for_each_component(w, [&](auto i) { w[i] *= s / step.h; });
     };
-    contact_.reach = [](void* door, StepState<C>& step, double h, double, double) {
-        ContactPhases& me = at(door);
+    contact_.reach = [](void* adapter, StepState<C>& step, double h, double, double) {
+        ContactPhases& me = at(adapter);
         return me.setup_.steps->reach(start(step), std::min(h, me.step_));
     };
     // Steps of fixed length are shortened only by steppers that locate changes.
@@ -259,22 +261,24 @@ template <class C>
 void ContactPhases<C>::make_phases()
 {
     PhaseTable<C>& t = rules_;
-    t.door = this;
-    t.own_guards = [](void* door) { return at(door).setup_.event_guards; };
-    t.stepper = [](void* door, Mode mode) { return at(door).stepper(mode); };
-    t.enter = [](void* door, Mode mode, double time, C& x) {
-        return at(door).enter(mode, time, x);
+    t.adapter = this;
+    t.own_guards = [](void* adapter) { return at(adapter).setup_.event_guards; };
+    t.stepper = [](void* adapter, Mode mode) { return at(adapter).stepper(mode); };
+    t.enter = [](void* adapter, Mode mode, double time, C& x) {
+        return at(adapter).enter(mode, time, x);
     };
-    t.decide = [](void* door, const PhaseSet<C>& set, C& after) {
-        return at(door).decide(set, after);
+    t.decide = [](void* adapter, const PhaseSet<C>& set, C& after) {
+        return at(adapter).decide(set, after);
     };
     t.changes = [](void*) { return std::span<const ReactionChange>(); };
-    t.records = [](void* door, std::size_t i) { return i < at(door).setup_.event_guards; };
-    t.review = [](void* door, const PhaseStep<C>& step, C&) { return at(door).review(step); };
-    t.give_up = [](void* door, const PhaseEnd<C>& end, C&) { return at(door).give_up(end); };
-    t.reason = [](void* door) { return std::string_view(at(door).reason_); };
-    t.save = [](void* door, std::vector<double>& memory) { at(door).save(memory); };
-    t.restore = [](void* door, const std::vector<double>& memory) { at(door).restore(memory); };
+    t.records = [](void* adapter, std::size_t i) { return i < at(adapter).setup_.event_guards; };
+    t.review = [](void* adapter, const PhaseStep<C>& step, C&) { return at(adapter).review(step); };
+    t.give_up = [](void* adapter, const PhaseEnd<C>& end, C&) { return at(adapter).give_up(end); };
+    t.reason = [](void* adapter) { return std::string_view(at(adapter).reason_); };
+    t.save = [](void* adapter, std::vector<double>& memory) { at(adapter).save(memory); };
+    t.restore = [](void* adapter, const std::vector<double>& memory) {
+        at(adapter).restore(memory);
+    };
 }
 
 namespace {
@@ -352,7 +356,7 @@ private:
         }
     }
 
-    RunSetup<C> setup_;
+    RunBindings<C> setup_;
     ContactPhases<C> phases_;
     Owner<AnyLoop<C>> loop_;
 };

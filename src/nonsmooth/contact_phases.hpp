@@ -51,9 +51,9 @@ private:
     };
     static constexpr std::size_t remembered = sizeof(Memory) / sizeof(double);
 
-    [[nodiscard]] static ContactPhases& at(void* door) noexcept
+    [[nodiscard]] static ContactPhases& at(void* adapter) noexcept
     {
-        return *static_cast<ContactPhases*>(door);
+        return *static_cast<ContactPhases*>(adapter);
     }
     [[nodiscard]] Mode with(Mode kind, Mode mode) const noexcept
     {

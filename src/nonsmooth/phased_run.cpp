@@ -19,7 +19,7 @@ public:
                   phase_options(options, setup_.error_controlled, setup.alone))
     {
         setup_.system = &system_.table();
-        setup_.door = &system_;
+        setup_.adapter = &system_;
         setup_.quiet = nullptr;
         setup_.quiet_on_series = false;
         const bool alone = system_.rules().options().alone.has_value();
@@ -56,7 +56,7 @@ private:
         return out;
     }
 
-    RunSetup<C> setup_;
+    RunBindings<C> setup_;
     PhasedSystem<C> system_;
     Owner<AnyLoop<C>> loop_;
 };

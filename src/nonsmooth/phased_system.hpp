@@ -37,7 +37,7 @@
 
 namespace ricochet::detail {
 
-/// The combined system; the door of its table.
+/// The combined system; the adapter of its table.
 template <class C>
 class PhasedSystem {
 public:
@@ -52,14 +52,14 @@ public:
           inclusions_(std::move(setup.inclusions)),
           rules_(some_inclusion(), by_mode_, options),
           reactions_(some_inclusion().reactions()),
-          guards_(own_.guarded ? own_.guard_count(user_.door) : 0)
+          guards_(own_.guarded ? own_.guard_count(user_.adapter) : 0)
     {
-        if (own_.moded && own_.mode_count(user_.door) >= own_modes) {
+        if (own_.moded && own_.mode_count(user_.adapter) >= own_modes) {
             throw std::invalid_argument(
                 "integrate: a system with set_valued() has at most 2^24 - 1 modes");
         }
         for (std::size_t i = 0; i < guards_; ++i) {
-            infos_.push_back(own_.info(user_.door, i));
+            infos_.push_back(own_.info(user_.adapter, i));
             infos_.back().resets = infos_.back().resets && own_.resets();
         }
         refuse_other_size(x0.size());
@@ -78,7 +78,7 @@ public:
     /// The mode in which a run starts at (t, x) in a mode of the user's.
     [[nodiscard]] Mode enter(Mode mode, double t, C& x)
     {
-        const std::size_t modes = own_.moded ? own_.mode_count(user_.door) : 1;
+        const std::size_t modes = own_.moded ? own_.mode_count(user_.adapter) : 1;
         if (modes > 0 && mode >= modes) throw_unknown_mode("integrate", mode, modes);
         mode_ = mode;
         const Kind kind = in(mode).enter(t, x.data());
@@ -88,9 +88,9 @@ public:
     }
 
 private:
-    [[nodiscard]] static PhasedSystem& at(void* door) noexcept
+    [[nodiscard]] static PhasedSystem& at(void* adapter) noexcept
     {
-        return *static_cast<PhasedSystem*>(door);
+        return *static_cast<PhasedSystem*>(adapter);
     }
 
     [[nodiscard]] static constexpr Kind kind_of(Mode mode) noexcept { return kind_of_phase(mode); }
@@ -100,7 +100,7 @@ private:
     }
     [[nodiscard]] bool is_mode(Mode mode) const
     {
-        const std::size_t modes = own_.moded ? own_.mode_count(user_.door) : 1;
+        const std::size_t modes = own_.moded ? own_.mode_count(user_.adapter) : 1;
         return mode < (modes > 0 ? modes : own_modes - 1);
     }
     /// The mode after a reset that returned a mode of the user's: one that no system has if the
@@ -178,7 +178,7 @@ private:
     void guards(Mode mode, double t, const C& x, std::span<double> g) const
     {
         if (guards_ > 0) {
-            own_.guards(user_.door, own_mode(mode), t, x, g.first(guards_));
+            own_.guards(user_.adapter, own_mode(mode), t, x, g.first(guards_));
             g = g.subspan(guards_);
         }
         guards_of_phases(mode, t, x.data(), g);
@@ -192,7 +192,7 @@ private:
     }
     [[nodiscard]] double guard(std::size_t i, Mode mode, double t, const C& x) const
     {
-        if (i < guards_) return own_.guard(user_.door, i, own_mode(mode), t, x);
+        if (i < guards_) return own_.guard(user_.adapter, i, own_mode(mode), t, x);
         const std::size_t which = i - guards_;
         const InBranches& by = in_branches(mode);
         if (!by.inclusion || rules_.watches_own(which)) {
@@ -204,7 +204,7 @@ private:
     {
         const Mode mode = own_mode(of.mode);
         if (of.which < guards_) {
-            return own_.rate(user_.door, {of.which, mode, of.backward}, time, x, dxdt);
+            return own_.rate(user_.adapter, {of.which, mode, of.backward}, time, x, dxdt);
         }
         const std::size_t which = of.which - guards_;
         const InBranches& by = in_branches(of.mode);
@@ -218,10 +218,10 @@ private:
     {
         const Mode mode = own_mode(motion.mode);
         if (own_.rates) {
-            own_.rates(user_.door, {mode, motion.t, motion.x, motion.s}, rates.first(guards_));
+            own_.rates(user_.adapter, {mode, motion.t, motion.x, motion.s}, rates.first(guards_));
         } else {
             for (std::size_t i = 0; i < guards_; ++i) {
-                rates[i] = own_.rate(user_.door, {i, mode}, {motion.t, 0}, motion.x, motion.s);
+                rates[i] = own_.rate(user_.adapter, {i, mode}, {motion.t, 0}, motion.x, motion.s);
             }
         }
         rates_of_phases(motion, rates.subspan(guards_));
@@ -263,7 +263,7 @@ private:
         if (!rules_.has_own_guards(kind) && stands_for(i, own_mode(mode)) != no_reaction) {
             return false;
         }
-        return !own_.enabled_in || own_.enabled_in(user_.door, i, own_mode(mode));
+        return !own_.enabled_in || own_.enabled_in(user_.adapter, i, own_mode(mode));
     }
 
     // --- resets ---
@@ -271,7 +271,7 @@ private:
     [[nodiscard]] Mode reset(std::size_t i, Mode mode, double t, C& x) const
     {
         if (i >= guards_ || !infos_[i].resets) return mode;
-        return reached(kind_of(mode), own_.reset(user_.door, i, own_mode(mode), t, x));
+        return reached(kind_of(mode), own_.reset(user_.adapter, i, own_mode(mode), t, x));
     }
     [[nodiscard]] Mode reset(const FiredGuards& fired, Mode mode, double t, C& x)
     {
@@ -285,15 +285,15 @@ private:
         const Mode own = own_mode(mode);
         if (resets) {
             const FiredGuards set(own_fired_, fired.time_event());
-            return reached(kind_of(mode), own_.reset_set(user_.door, set, own, t, x));
+            return reached(kind_of(mode), own_.reset_set(user_.adapter, set, own, t, x));
         }
         if (!fired.time_event() || !own_.time_reset) return mode;
-        return reached(kind_of(mode), own_.time_reset(user_.door, own, t, x));
+        return reached(kind_of(mode), own_.time_reset(user_.adapter, own, t, x));
     }
     [[nodiscard]] Mode rest(std::size_t i, Mode mode, double t, C& x)
     {
         const C before = x;
-        const Mode own = own_.rest(user_.door, i, own_mode(mode), t, x);
+        const Mode own = own_.rest(user_.adapter, i, own_mode(mode), t, x);
         if (!is_mode(own)) return std::numeric_limits<Mode>::max();
         mode_ = own;
         if (changes_inclusion(own_mode(mode), own)) {
@@ -313,7 +313,7 @@ private:
     [[nodiscard]] Stepper<C> stepper(Mode mode)
     {
         const Kind kind = kind_of(mode);
-        if (kind == PhaseRules::own) return {&own_kernel_, user_.door, own_.flow};
+        if (kind == PhaseRules::own) return {&own_kernel_, user_.adapter, own_.flow};
         if (rules_.is_implicit(kind)) return {&implicit_, this, table_.flow};
         const InBranches& by = in_branches(mode);
         if (!by.inclusion) return {free_, this, table_.flow};
@@ -325,14 +325,14 @@ private:
     {
         if constexpr (std::is_same_v<C, SmallState>) {
             const BranchStepper steps = by.inclusion->stepper(method_, by.branches);
-            if (steps.kernel) return {steps.kernel, steps.door};
+            if (steps.kernel) return {steps.kernel, steps.adapter};
         }
         return {free_, this, table_.flow};
     }
     bool flow(Mode mode, double t, const C& x, C& dxdt)
     {
         const Kind kind = kind_of(mode);
-        if (kind == PhaseRules::own) return own_.flow(user_.door, own_mode(mode), t, x, dxdt);
+        if (kind == PhaseRules::own) return own_.flow(user_.adapter, own_mode(mode), t, x, dxdt);
         if (const InBranches& by = in_branches(mode); by.inclusion) {
             by.inclusion->flow(by.branches, t, x.data(), dxdt.data());
         } else {
@@ -357,7 +357,7 @@ private:
         const bool releases = of.what == PhaseVerdict::Kind::changes &&
                               of.kind == PhaseRules::own && !rules_.has_own_guards(kind_of(mode));
         if (start_mode_ && releases) {
-            own = start_mode_(user_.door, own, t, x);
+            own = start_mode_(user_.adapter, own, t, x);
             if (!is_mode(own)) return {PhaseVerdict::Kind::ends, mode, 0, Outcome::unknown_mode};
             if (changes_inclusion(own_mode(mode), own)) {
                 out.mode = with(in(own).enter_mode(of.kind, t, x.data()), own);
@@ -431,7 +431,7 @@ private:
     /// the error is that which asks for a shorter one.
     [[nodiscard]] double attempt_held(StepState<C>& step, double h, double rtol, double atol)
     {
-        const double error = explicit_.kernel->attempt(explicit_.door, step, h, rtol, atol);
+        const double error = explicit_.kernel->attempt(explicit_.adapter, step, h, rtol, atol);
         if (!(error <= 1)) return error;
         const InBranches& by = in_branches(step.mode);
         const double fraction =
@@ -441,12 +441,12 @@ private:
         return std::max(error, std::pow(0.9 / fraction, free_->error_order + 1));
     }
 
-    RunSetup<C> user_;
+    RunBindings<C> user_;
     const SystemTable<C>& own_;
     StepKernel<C> own_kernel_;
     bool by_mode_;  ///< one inclusion for each mode, else the first in all modes
-    Mode (*start_mode_)(void* door, Mode mode, double t, const C& x);
-    Mode (*change_)(void* door, std::size_t reaction, EventKind kind, Mode mode, double t, C& x);
+    Mode (*start_mode_)(void* adapter, Mode mode, double t, const C& x);
+    Mode (*change_)(void* adapter, std::size_t reaction, EventKind kind, Mode mode, double t, C& x);
     MethodName method_;  ///< of explicit phases
     std::vector<Owner<BranchPhases>> inclusions_;
     std::vector<ModeInclusion> modes_;
@@ -530,7 +530,7 @@ template <class C>
 void PhasedSystem<C>::refuse_partly_active() const
 {
     if (by_mode_ || !own_.enabled_in || !own_.moded) return;
-    const std::size_t modes = std::min(own_.mode_count(user_.door), most_inclusions);
+    const std::size_t modes = std::min(own_.mode_count(user_.adapter), most_inclusions);
     for (std::size_t mode = 0; mode < modes; ++mode) {
         std::size_t inactive = no_reaction, active = 0;
         for (std::size_t k = 0; k < reactions_; ++k) {
@@ -539,7 +539,7 @@ void PhasedSystem<C>::refuse_partly_active() const
                 const std::size_t its = modes_[0].stands_for[i];
                 if ((its != no_reaction ? its : infos_[i].reaction) != k) continue;
                 any = true;
-                enabled = enabled || own_.enabled_in(user_.door, i, static_cast<Mode>(mode));
+                enabled = enabled || own_.enabled_in(user_.adapter, i, static_cast<Mode>(mode));
             }
             if (any && !enabled) {
                 inactive = k;
@@ -563,7 +563,7 @@ bool PhasedSystem<C>::is_active(Mode mode) const
     for (std::size_t i = 0; i < has_reaction_.size(); ++i) {
         if (!has_reaction_[i]) continue;
         any = true;
-        if (own_.enabled_in(user_.door, i, mode)) return true;
+        if (own_.enabled_in(user_.adapter, i, mode)) return true;
     }
     return !any;
 }
@@ -585,9 +585,9 @@ void PhasedSystem<C>::find_reactions_of_guards(ModeInclusion& of, const C& x0)
             for (std::size_t c = 0; c < static_cast<std::size_t>(x.size()); ++c) {
                 x[c] += 0.3 * size * std::sin(1.7 + 3.1 * static_cast<double>(c) + 5.3 * j);
             }
-            away = std::fmax(away, std::fabs(own_.guard(user_.door, i, of.mode, t, x)));
+            away = std::fmax(away, std::fabs(own_.guard(user_.adapter, i, of.mode, t, x)));
             if (!of.inclusion->move_onto(k, t, x.data())) return false;
-            near = std::fmax(near, std::fabs(own_.guard(user_.door, i, of.mode, t, x)));
+            near = std::fmax(near, std::fabs(own_.guard(user_.adapter, i, of.mode, t, x)));
         }
         return std::isfinite(away) && away > 0 && near <= 1e-9 * away;
     };
@@ -653,7 +653,7 @@ bool PhasedSystem<C>::agrees(const PhaseSet<C>& set)
     C x = set.x;
     if (!rules_.step_back(set.t, x.data())) return true;
     C rate = x;
-    if (!own_.flow(user_.door, own_mode(set.before), set.t, x, rate)) return true;
+    if (!own_.flow(user_.adapter, own_mode(set.before), set.t, x, rate)) return true;
     return rules_.is_flow(set.t, x.data(), rate.data());
 }
 
@@ -661,7 +661,7 @@ template <class C>
 bool PhasedSystem<C>::agrees_at_start(Mode mode, double t, const C& x)
 {
     C rate = x;
-    if (!own_.flow(user_.door, mode, t, x, rate)) return true;
+    if (!own_.flow(user_.adapter, mode, t, x, rate)) return true;
     return rules_.is_flow_at_start(t, x.data(), rate.data());
 }
 
@@ -673,7 +673,7 @@ Mode PhasedSystem<C>::after_changes(Mode decided, double t, C& x)
     Mode next = mode;
     for (const ReactionChange& change : rules_.changes()) {
         if (change.kind == EventKind::touch) continue;
-        next = change_(user_.door, change.reaction, change.kind, next, t, x);
+        next = change_(user_.adapter, change.reaction, change.kind, next, t, x);
         if (!is_mode(next)) return std::numeric_limits<Mode>::max();
     }
     if (next == mode && same_state(x, before)) return decided;
@@ -689,35 +689,35 @@ void PhasedSystem<C>::make_kernels(std::size_t size)
     own_kernel_.cross = nullptr;
     free_ = &kernel_by_name<C>(method_, size);
     held_ = *free_;
-    held_.take = [](void* door, StepState<C>& step, double h) {
-        const Stepper<C>& by = at(door).explicit_;
-        return by.kernel->take(by.door, step, h);
+    held_.take = [](void* adapter, StepState<C>& step, double h) {
+        const Stepper<C>& by = at(adapter).explicit_;
+        return by.kernel->take(by.adapter, step, h);
     };
-    held_.depart = [](void* door, StepState<C>& step, double s, C& w, C& rate) {
-        const Stepper<C>& by = at(door).explicit_;
-        by.kernel->depart(by.door, step, s, w, rate);
+    held_.depart = [](void* adapter, StepState<C>& step, double s, C& w, C& rate) {
+        const Stepper<C>& by = at(adapter).explicit_;
+        by.kernel->depart(by.adapter, step, s, w, rate);
     };
-    held_.attempt = [](void* door, StepState<C>& step, double h, double rtol, double atol) {
-        return at(door).attempt_held(step, h, rtol, atol);
+    held_.attempt = [](void* adapter, StepState<C>& step, double h, double rtol, double atol) {
+        return at(adapter).attempt_held(step, h, rtol, atol);
     };
     implicit_.order = implicit_.error_order = 2;
     implicit_.end_rate = true;
-    implicit_.take = [](void* door, StepState<C>& step, double h) {
-        return at(door).take_implicit(step, h);
+    implicit_.take = [](void* adapter, StepState<C>& step, double h) {
+        return at(adapter).take_implicit(step, h);
     };
-    implicit_.attempt = [](void* door, StepState<C>& step, double h, double rtol, double atol) {
-        return at(door).attempt_implicit(step, h, rtol, atol);
+    implicit_.attempt = [](void* adapter, StepState<C>& step, double h, double rtol, double atol) {
+        return at(adapter).attempt_implicit(step, h, rtol, atol);
     };
-    implicit_.depart = [](void* door, StepState<C>& step, double s, C& w, C& rate) {
-        at(door).depart(step, s, w, rate);
+    implicit_.depart = [](void* adapter, StepState<C>& step, double s, C& w, C& rate) {
+        at(adapter).depart(step, s, w, rate);
     };
-    implicit_.reach = [](void* door, StepState<C>& step, double h, double, double) {
-        PhasedSystem& me = at(door);
+    implicit_.reach = [](void* adapter, StepState<C>& step, double h, double, double) {
+        PhasedSystem& me = at(adapter);
         return me.inclusion(step).reach(me.implicit_start(step),
                                         std::min(h, me.rules_.options().step));
     };
-    implicit_.ends_at_change = [](void* door, const StepState<C>& step) {
-        return at(door).inclusion(step).ends_at_change();
+    implicit_.ends_at_change = [](void* adapter, const StepState<C>& step) {
+        return at(adapter).inclusion(step).ends_at_change();
     };
 }
 
@@ -727,12 +727,12 @@ void PhasedSystem<C>::make_table()
     SystemTable<C>& t = table_;
     t.guarded = t.moded = t.fixed_dimension = t.guard_alone = t.forward_only = true;
     t.phases = &phases_;
-    t.name = [](void* door) { return at(door).own_.name(at(door).user_.door); };
-    t.flow = [](void* door, Mode mode, double time, const C& x, C& dxdt) {
-        return at(door).flow(mode, time, x, dxdt);
+    t.name = [](void* adapter) { return at(adapter).own_.name(at(adapter).user_.adapter); };
+    t.flow = [](void* adapter, Mode mode, double time, const C& x, C& dxdt) {
+        return at(adapter).flow(mode, time, x, dxdt);
     };
-    t.mode_count = [](void* door) {
-        return static_cast<std::size_t>(at(door).rules_.kinds()) * own_modes;
+    t.mode_count = [](void* adapter) {
+        return static_cast<std::size_t>(at(adapter).rules_.kinds()) * own_modes;
     };
     add_guards();
     add_resets();
@@ -743,39 +743,41 @@ template <class C>
 void PhasedSystem<C>::add_guards()
 {
     SystemTable<C>& t = table_;
-    t.guard_count = [](void* door) { return at(door).all_guards(); };
-    t.info = [](void* door, std::size_t i) { return at(door).info(i); };
-    t.guards = [](void* door, Mode mode, double time, const C& x, std::span<double> g) {
-        at(door).guards(mode, time, x, g);
+    t.guard_count = [](void* adapter) { return at(adapter).all_guards(); };
+    t.info = [](void* adapter, std::size_t i) { return at(adapter).info(i); };
+    t.guards = [](void* adapter, Mode mode, double time, const C& x, std::span<double> g) {
+        at(adapter).guards(mode, time, x, g);
     };
     if (guards_ == 0) {
-        t.guards = [](void* door, Mode mode, double time, const C& x, std::span<double> g) {
-            at(door).guards_of_phases(mode, time, x.data(), g);
+        t.guards = [](void* adapter, Mode mode, double time, const C& x, std::span<double> g) {
+            at(adapter).guards_of_phases(mode, time, x.data(), g);
         };
     }
-    t.guard = [](void* door, std::size_t i, Mode mode, double time, const C& x) {
-        return at(door).guard(i, mode, time, x);
+    t.guard = [](void* adapter, std::size_t i, Mode mode, double time, const C& x) {
+        return at(adapter).guard(i, mode, time, x);
     };
-    t.rate = [](void* door, GuardInMode of, ScaledTime time, const C& x, const C& dxdt) {
-        return at(door).rate(of, time, x, dxdt);
+    t.rate = [](void* adapter, GuardInMode of, ScaledTime time, const C& x, const C& dxdt) {
+        return at(adapter).rate(of, time, x, dxdt);
     };
     t.rated = guards_ == 0 || own_.rated;
     t.calls_of_rate = t.rated ? 0 : 2;
     if (t.rated) {
-        t.rates = [](void* door, const Along<C>& motion, std::span<double> rates) {
-            at(door).rates(motion, rates);
+        t.rates = [](void* adapter, const Along<C>& motion, std::span<double> rates) {
+            at(adapter).rates(motion, rates);
         };
     }
     if (guards_ == 0) {
-        t.rates = [](void* door, const Along<C>& motion, std::span<double> rates) {
-            at(door).rates_of_phases(motion, rates);
+        t.rates = [](void* adapter, const Along<C>& motion, std::span<double> rates) {
+            at(adapter).rates_of_phases(motion, rates);
         };
     }
-    t.enabled_in = [](void* door, std::size_t i, Mode mode) { return at(door).enabled(i, mode); };
+    t.enabled_in = [](void* adapter, std::size_t i, Mode mode) {
+        return at(adapter).enabled(i, mode);
+    };
     if (!own_.enabled_at) return;
-    t.enabled_at = [](void* door, std::size_t i, Mode mode, double time, const C& x) {
-        const PhasedSystem& me = at(door);
-        return i >= me.guards_ || me.own_.enabled_at(me.user_.door, i, own_mode(mode), time, x);
+    t.enabled_at = [](void* adapter, std::size_t i, Mode mode, double time, const C& x) {
+        const PhasedSystem& me = at(adapter);
+        return i >= me.guards_ || me.own_.enabled_at(me.user_.adapter, i, own_mode(mode), time, x);
     };
 }
 
@@ -784,17 +786,17 @@ void PhasedSystem<C>::add_resets()
 {
     SystemTable<C>& t = table_;
     if (own_.reset_set) {
-        t.reset_set = [](void* door, const FiredGuards& fired, Mode mode, double time, C& x) {
-            return at(door).reset(fired, mode, time, x);
+        t.reset_set = [](void* adapter, const FiredGuards& fired, Mode mode, double time, C& x) {
+            return at(adapter).reset(fired, mode, time, x);
         };
     } else {
-        t.reset = [](void* door, std::size_t i, Mode mode, double time, C& x) {
-            return at(door).reset(i, mode, time, x);
+        t.reset = [](void* adapter, std::size_t i, Mode mode, double time, C& x) {
+            return at(adapter).reset(i, mode, time, x);
         };
     }
     if (!own_.rest) return;
-    t.rest = [](void* door, std::size_t i, Mode mode, double time, C& x) {
-        return at(door).rest(i, mode, time, x);
+    t.rest = [](void* adapter, std::size_t i, Mode mode, double time, C& x) {
+        return at(adapter).rest(i, mode, time, x);
     };
 }
 
@@ -803,26 +805,26 @@ void PhasedSystem<C>::add_time_events()
 {
     SystemTable<C>& t = table_;
     if (own_.next_time_event) {
-        t.next_time_event = [](void* door, double time) {
-            return at(door).own_.next_time_event(at(door).user_.door, time);
+        t.next_time_event = [](void* adapter, double time) {
+            return at(adapter).own_.next_time_event(at(adapter).user_.adapter, time);
         };
     }
     if (own_.next_time_event_at) {
-        t.next_time_event_at = [](void* door, Mode mode, double time, const C& x) {
-            const PhasedSystem& me = at(door);
-            return me.own_.next_time_event_at(me.user_.door, own_mode(mode), time, x);
+        t.next_time_event_at = [](void* adapter, Mode mode, double time, const C& x) {
+            const PhasedSystem& me = at(adapter);
+            return me.own_.next_time_event_at(me.user_.adapter, own_mode(mode), time, x);
         };
     }
     if (own_.time_event_count) {
-        t.time_event_count = [](void* door, double time) {
-            return at(door).own_.time_event_count(at(door).user_.door, time);
+        t.time_event_count = [](void* adapter, double time) {
+            return at(adapter).own_.time_event_count(at(adapter).user_.adapter, time);
         };
     }
     if (own_.time_reset) {
-        t.time_reset = [](void* door, Mode mode, double time, C& x) {
-            const PhasedSystem& me = at(door);
+        t.time_reset = [](void* adapter, Mode mode, double time, C& x) {
+            const PhasedSystem& me = at(adapter);
             return me.reached(kind_of(mode),
-                              me.own_.time_reset(me.user_.door, own_mode(mode), time, x));
+                              me.own_.time_reset(me.user_.adapter, own_mode(mode), time, x));
         };
     }
 }
@@ -831,30 +833,30 @@ template <class C>
 void PhasedSystem<C>::make_phases()
 {
     PhaseTable<C>& t = phases_;
-    t.door = this;
-    t.own_guards = [](void* door) { return at(door).guards_; };
-    t.stepper = [](void* door, Mode mode) { return at(door).stepper(mode); };
-    t.enter = [](void* door, Mode mode, double time, C& x) {
-        return at(door).enter(mode, time, x);
+    t.adapter = this;
+    t.own_guards = [](void* adapter) { return at(adapter).guards_; };
+    t.stepper = [](void* adapter, Mode mode) { return at(adapter).stepper(mode); };
+    t.enter = [](void* adapter, Mode mode, double time, C& x) {
+        return at(adapter).enter(mode, time, x);
     };
-    t.decide = [](void* door, const PhaseSet<C>& set, C& after) {
-        return at(door).decide(set, after);
+    t.decide = [](void* adapter, const PhaseSet<C>& set, C& after) {
+        return at(adapter).decide(set, after);
     };
-    t.changes = [](void* door) { return at(door).changes(); };
-    t.records = [](void* door, std::size_t i) {
-        const PhasedSystem& me = at(door);
+    t.changes = [](void* adapter) { return at(adapter).changes(); };
+    t.records = [](void* adapter, std::size_t i) {
+        const PhasedSystem& me = at(adapter);
         return i < me.guards_ && me.rules_.records(me.stands_for(i, me.mode_), i);
     };
-    t.goes_on = [](void* door, Mode mode, double time, const C& x, bool has_advanced) {
-        PhasedSystem& me = at(door);
+    t.goes_on = [](void* adapter, Mode mode, double time, const C& x, bool has_advanced) {
+        PhasedSystem& me = at(adapter);
         const InBranches& by = me.in_branches(mode);
         if (!by.inclusion) return false;
         me.mode_ = own_mode(mode);
         return me.rules_.goes_on(kind_of(mode), *by.inclusion, by.branches, time, x.data(),
                                  has_advanced);
     };
-    t.review = [](void* door, const PhaseStep<C>& step, C& x) {
-        PhasedSystem& me = at(door);
+    t.review = [](void* adapter, const PhaseStep<C>& step, C& x) {
+        PhasedSystem& me = at(adapter);
         const auto of = me.in(own_mode(step.mode))
                             .review({.kind = kind_of(step.mode),
                                      .t = step.t,
@@ -864,8 +866,8 @@ void PhasedSystem<C>::make_phases()
                                     x.data());
         return me.verdict(of, step.mode, step.t, x);
     };
-    t.give_up = [](void* door, const PhaseEnd<C>& end, C& x) {
-        PhasedSystem& me = at(door);
+    t.give_up = [](void* adapter, const PhaseEnd<C>& end, C& x) {
+        PhasedSystem& me = at(adapter);
         const bool of_phases = end.guard == no_guard || end.guard >= me.guards_;
         const Mode mode = own_mode(end.mode);
         const std::size_t reaction = of_phases ? no_reaction : me.reaction_of(end.guard, mode);
@@ -880,23 +882,23 @@ void PhasedSystem<C>::make_phases()
                                             x.data());
         return me.verdict(of, end.mode, end.t, x);
     };
-    t.reason = [](void* door) { return std::string_view(at(door).rules_.reason()); };
-    t.reaction = [](void* door, const PhasePlace<C>& at, std::vector<double>& r) {
-        PhasedSystem& me = PhasedSystem::at(door);
+    t.reason = [](void* adapter) { return std::string_view(at(adapter).rules_.reason()); };
+    t.reaction = [](void* adapter, const PhasePlace<C>& at, std::vector<double>& r) {
+        PhasedSystem& me = PhasedSystem::at(adapter);
         me.in(own_mode(at.mode))
             .reaction(kind_of(at.mode), {at.t0, at.x0.data(), at.s, at.t, at.x.data()}, r);
     };
-    t.list_in = [](void* door, std::vector<MotionPhase>& phases) {
-        at(door).rules_.list_in(phases);
+    t.list_in = [](void* adapter, std::vector<MotionPhase>& phases) {
+        at(adapter).rules_.list_in(phases);
     };
-    t.complete = [](void* door, Run<C>& run) { at(door).complete(run); };
-    t.save = [](void* door, std::vector<double>& memory) {
-        const PhasedSystem& me = at(door);
+    t.complete = [](void* adapter, Run<C>& run) { at(adapter).complete(run); };
+    t.save = [](void* adapter, std::vector<double>& memory) {
+        const PhasedSystem& me = at(adapter);
         me.in(me.mode_).save(memory);
         memory.push_back(static_cast<double>(me.mode_));
     };
-    t.restore = [](void* door, const std::vector<double>& memory) {
-        PhasedSystem& me = at(door);
+    t.restore = [](void* adapter, const std::vector<double>& memory) {
+        PhasedSystem& me = at(adapter);
         me.mode_ = static_cast<Mode>(memory.back());
         me.in(me.mode_).restore(memory);
     };

@@ -96,7 +96,7 @@ struct IslandContact {
     std::array<double, 2> impulse{};  ///< [N s] normal and tangential
 };
 
-/// Patience of a body that is handed over at `t` and was handed back at `released_at`: it doubles
+/// Backoff of a body that is handed over at `t` and was handed back at `released_at`: it doubles
 /// where that was within ten steps, so that a body does not alternate for long.
 [[nodiscard]] constexpr std::uint32_t next_patience(std::uint32_t patience, double released_at,
                                                     double t, double step) noexcept

@@ -8,7 +8,7 @@
 #include "scene/groups.hpp"
 #include "scene/islands.hpp"
 #include "scene/options.hpp"
-#include "scene/runner.hpp"
+#include "scene/scene_loop.hpp"
 
 namespace ricochet {
 

@@ -13,7 +13,7 @@
 #include "scene/groups.hpp"
 #include "scene/large_pages.hpp"
 #include "scene/options.hpp"
-#include "scene/runner.hpp"
+#include "scene/scene_loop.hpp"
 
 namespace ricochet {
 
@@ -64,7 +64,7 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
     }
     Samples samples{run.samples, run.sample_turns};
     if (world.options.record_events) run.events.reserve(16);
-    Runner runner(world, t_end);
+    SceneLoop runner(world, t_end);
     for (std::size_t number = 0; number < groups.size(); ++number) {
         const auto group = groups[number];
         const std::size_t known = run.events.size();

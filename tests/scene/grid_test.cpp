@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "scene/brute_force.hpp"
-#include "scene/calendar.hpp"
+#include "scene/event_queue.hpp"
 #include "scene/gas.hpp"
 #include "scene/options.hpp"
 
@@ -496,14 +496,14 @@ private:
     std::set<std::pair<double, std::uint32_t>> order_;
 };
 
-TEST(Calendars, HaveTheOrderOfASortedSet)
+TEST(EventQueues, HaveTheOrderOfASortedSet)
 {
     constexpr std::uint32_t count = 500;
     for (const bool ring : {false, true}) {
         // Intervals of all magnitudes to the next event, some equal, some zero, some infinite.
         std::mt19937 generator(11);
         std::uniform_real_distribution<double> uniform(0, 1);
-        Calendar calendar(count);
+        EventQueue calendar(count);
         for (int round = 0; round < 2; ++round) {
             calendar.clear(ring);
             EXPECT_TRUE(calendar.empty());
@@ -536,7 +536,7 @@ TEST(Calendars, HaveTheOrderOfASortedSet)
     }
 }
 
-TEST(Calendars, AreTheSameToTheBit)
+TEST(EventQueues, AreTheSameToTheBit)
 {
     for (const std::size_t count : {3, 200}) {
         const Scene scene = test::gas({.count = count, .gravity = {0.1, -1}, .spread = 0.2});

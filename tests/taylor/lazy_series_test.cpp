@@ -99,9 +99,9 @@ TEST(LazySeries, ABranchOnAParameterIsThatOfTheObject)
     ASSERT_GT(always.events.size(), 4U);
     expect_same_events(always, branching, 1e-13);
     // An object like the one that the compiler knows is not slowed down by the other one.
-    const detail::StepperDoor<Damped, Two, Taylor> plain(Damped{}, Two{});
+    const detail::StepperAdapter<Damped, Two, Taylor> plain(Damped{}, Two{});
     EXPECT_TRUE(plain.as_compiled());
-    const detail::StepperDoor<Damped, Two, Taylor> damped(Damped{0.1}, Two{});
+    const detail::StepperAdapter<Damped, Two, Taylor> damped(Damped{0.1}, Two{});
     EXPECT_FALSE(damped.as_compiled());
 }
 
@@ -123,7 +123,7 @@ struct Chain {
 
 TEST(LazySeries, FlowsOfMoreOperationsThanAreCompiledAgreeWithFehlberg78)
 {
-    EXPECT_FALSE((detail::StepperDoor<Chain, Chain::State, Taylor>(Chain{}, {}).as_compiled()));
+    EXPECT_FALSE((detail::StepperAdapter<Chain, Chain::State, Taylor>(Chain{}, {}).as_compiled()));
     Chain::State start{};
     for (std::size_t i = 0; i < Chain::n; i += 2) start[i] = 0.1 * std::sin(static_cast<double>(i));
     const Options options{.t_end = 5, .rtol = 1e-13, .atol = 1e-13};

@@ -19,9 +19,9 @@ namespace ricochet::detail {
 
 /// All parts of a run except its start and its options. Objects that it points to must outlive it.
 template <class X>
-struct RunSetup {
+struct RunBindings {
     const SystemTable<X>* system = nullptr;
-    void* door = nullptr;
+    void* adapter = nullptr;
     const StepKernel<X>* kernel = nullptr;
     QuietKernel<X> quiet = nullptr;  ///< with flow and guard inlined; may be null
     bool quiet_on_series = false;    ///< it clears guards by their power series
@@ -83,16 +83,16 @@ public:
 
 /// Keeps a copy of `setup`. @throws std::invalid_argument as `Simulation` does
 template <class X>
-[[nodiscard]] Owner<AnyLoop<X>> make_loop(const RunSetup<X>& setup, const X& x0,
+[[nodiscard]] Owner<AnyLoop<X>> make_loop(const RunBindings<X>& setup, const X& x0,
                                           const Options& options);
 
 /// Computes a whole run, with the loop on the stack.
 template <class X>
-[[nodiscard]] Run<X> run_whole(const RunSetup<X>& setup, const X& x0, const Options& options);
+[[nodiscard]] Run<X> run_whole(const RunBindings<X>& setup, const X& x0, const Options& options);
 
 /// The same, with the result shown to `take` where it is, and not moved.
 template <class X>
-void run_whole(const RunSetup<X>& setup, const X& x0, const Options& options,
+void run_whole(const RunBindings<X>& setup, const X& x0, const Options& options,
                void (*take)(void* out, const Run<X>& run), void* out);
 
 }  // namespace ricochet::detail

@@ -44,10 +44,10 @@ struct DetectorTable {
     Finding (*examine)(Self, GuardPath& path, Watch& watch) = nullptr;
     /// Checks whether the detector fits the system, in steps between `smallest` and `largest` [s].
     /// @throws std::invalid_argument if it does not
-    void (*check)(Self, void* door, const X& x, double smallest, double largest) = nullptr;
+    void (*check)(Self, void* adapter, const X& x, double smallest, double largest) = nullptr;
 
     // --- predictions of one guard ---
-    bool (*clears)(Self, void* door, const StepState<X>& step, std::uint64_t& calls) = nullptr;
+    bool (*clears)(Self, void* adapter, const StepState<X>& step, std::uint64_t& calls) = nullptr;
     bool checks_every_step = true;
 
     // --- deferred checks ---
@@ -61,11 +61,12 @@ struct DetectorTable {
     double (*hoped)(Self, const GuardBound& at, double slope, double band) = nullptr;
     bool (*closes)(Self, const GuardBound& from, const GuardBound& to, double tau,
                    double band) = nullptr;
-    GateAnswer (*horizon)(Self, void* door, Mode mode, double t, const X& x) = nullptr;
-    GateAnswer (*level)(Self, void* door, GuardInMode, double t, const X& x) = nullptr;
+    GateAnswer (*horizon)(Self, void* adapter, Mode mode, double t, const X& x) = nullptr;
+    GateAnswer (*level)(Self, void* adapter, GuardInMode, double t, const X& x) = nullptr;
     double lowest_level = 0;
     /// A guard on a tube around the motion. Null: its events are excluded by values.
-    Enclosure (*along)(Self, void* door, const GuardInMode&, const MotionTube<X>& tube) = nullptr;
+    Enclosure (*along)(Self, void* adapter, const GuardInMode&,
+                       const MotionTube<X>& tube) = nullptr;
     const MeterOptions* metering = nullptr;
 };
 

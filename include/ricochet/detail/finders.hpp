@@ -7,8 +7,8 @@
 #include <type_traits>
 
 #include "ricochet/detail/detector_table.hpp"
-#include "ricochet/detail/door.hpp"
 #include "ricochet/detail/meter.hpp"
+#include "ricochet/detail/system_adapter.hpp"
 #include "ricochet/locators.hpp"
 #include "ricochet/planned.hpp"
 
@@ -17,11 +17,11 @@ namespace ricochet::detail {
 /// Inputs of a network that predicts the events of a step.
 template <class System, class X>
 class StepToCome {
-    using D = Door<System, X>;
+    using D = SystemAdapter<System, X>;
 
 public:
-    StepToCome(D& door, const StepState<CoreState<X>>& step)
-        : step_(&step), x0_(&door.read(step.x0, 0)), rate0_(&door.read(step.rate0, 1))
+    StepToCome(D& adapter, const StepState<CoreState<X>>& step)
+        : step_(&step), x0_(&adapter.read(step.x0, 0)), rate0_(&adapter.read(step.rate0, 1))
     {
     }
 
@@ -38,7 +38,7 @@ private:
 
 template <class Detector, class System, class X>
 class DetectorTableOf {
-    using D = Door<System, X>;
+    using D = SystemAdapter<System, X>;
     using C = CoreState<X>;
     using Self = const void*;
 
@@ -46,7 +46,7 @@ class DetectorTableOf {
     {
         return *static_cast<const Detector*>(detector);
     }
-    [[nodiscard]] static D& at(void* door) noexcept { return *static_cast<D*>(door); }
+    [[nodiscard]] static D& at(void* adapter) noexcept { return *static_cast<D*>(adapter); }
 
     static void add_deferral(DetectorTable<C>& table, const Detector& detector)
     {
@@ -67,16 +67,17 @@ class DetectorTableOf {
         if constexpr (requires(const System& s, const GuardInMode& of, const MotionTube<C>& tube) {
                           Detector::template along<X>(s, of, tube);
                       }) {
-            table.along = [](Self, void* door, const GuardInMode& of, const MotionTube<C>& tube) {
-                return Detector::template along<X>(at(door).system(), of, tube);
+            table.along = [](Self, void* adapter, const GuardInMode& of,
+                             const MotionTube<C>& tube) {
+                return Detector::template along<X>(at(adapter).system(), of, tube);
             };
         }
         if constexpr (requires(const System& s, const X& x) {
                           detector.horizon(s, Mode{}, 0.0, x);
                       }) {
-            table.horizon = [](Self d, void* door, Mode mode, double t, const C& x) {
+            table.horizon = [](Self d, void* adapter, Mode mode, double t, const C& x) {
                 const auto answer =
-                    self(d).horizon(at(door).system(), mode, t, at(door).read(x, 0));
+                    self(d).horizon(at(adapter).system(), mode, t, at(adapter).read(x, 0));
                 return GateAnswer{answer.cleared, answer.outside};
             };
         }
@@ -84,19 +85,19 @@ class DetectorTableOf {
                           detector.level(s, std::size_t{}, Mode{}, 0.0, x);
                       }) {
             table.lowest_level = detector.lowest_level();
-            table.level = [](Self d, void* door, GuardInMode of, double t, const C& x) {
-                const auto answer =
-                    self(d).level(at(door).system(), of.which, of.mode, t, at(door).read(x, 0));
+            table.level = [](Self d, void* adapter, GuardInMode of, double t, const C& x) {
+                const auto answer = self(d).level(at(adapter).system(), of.which, of.mode, t,
+                                                  at(adapter).read(x, 0));
                 return GateAnswer{answer.cleared, answer.outside};
             };
         }
     }
 
-    static bool clears(Self detector, void* door, const StepState<C>& step, std::uint64_t& calls)
+    static bool clears(Self detector, void* adapter, const StepState<C>& step, std::uint64_t& calls)
     {
-        const GuardView<System, X> guard(at(door).system(), calls,
+        const GuardView<System, X> guard(at(adapter).system(), calls,
                                          {.mode = step.mode, .backward = step.backward});
-        return self(detector).clears(guard, StepToCome<System, X>(at(door), step));
+        return self(detector).clears(guard, StepToCome<System, X>(at(adapter), step));
     }
 
     static void fill(DetectorTable<C>& table, const Detector& detector)
@@ -117,8 +118,8 @@ class DetectorTableOf {
             return self(d).examine(path, watch);
         };
         if constexpr (requires(const System& s, const X& x) { detector.check(s, x, 0.0, 0.0); }) {
-            table.check = [](Self d, void* door, const C& x, double smallest, double largest) {
-                self(d).check(at(door).system(), at(door).read(x, 0), smallest, largest);
+            table.check = [](Self d, void* adapter, const C& x, double smallest, double largest) {
+                self(d).check(at(adapter).system(), at(adapter).read(x, 0), smallest, largest);
             };
         }
         if constexpr (predicts) {

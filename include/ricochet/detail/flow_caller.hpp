@@ -24,8 +24,8 @@ struct ByPointer {};
 /// The flow of a step by pointer, when and in which mode it is called, and how often it was.
 template <class C>
 struct FlowCaller {
-    void* door;
-    bool (*flow)(void* door, Mode mode, double t, const C& x, C& dxdt);
+    void* adapter;
+    bool (*flow)(void* adapter, Mode mode, double t, const C& x, C& dxdt);
     Instant start;
     Mode mode;
     bool backward;
@@ -33,8 +33,8 @@ struct FlowCaller {
     std::uint64_t calls = 0;
     bool fits = true;
 
-    FlowCaller(void* door_, const StepState<C>& step)
-        : door(door_),
+    FlowCaller(void* adapter_, const StepState<C>& step)
+        : adapter(adapter_),
           flow(step.flow),
           start(step.start),
           mode(step.mode),

@@ -22,7 +22,7 @@ class KernelOf {
 
     /// Takes a step. Returns the largest ratio of error to tolerance, 0 without an estimate, which
     /// a negative `rtol` leaves out; NaN if the step is not finite.
-    RICOCHET_BY_ONES [[gnu::noinline]] static double attempt(void* door, State& step, double h,
+    RICOCHET_BY_ONES [[gnu::noinline]] static double attempt(void* adapter, State& step, double h,
                                                              [[maybe_unused]] double rtol,
                                                              [[maybe_unused]] double atol)
     {
@@ -30,13 +30,13 @@ class KernelOf {
         step.h = h;
         step.has_middle = false;
         step.asked_alone = 0;
-        FlowCaller<C> caller(door, step);
+        FlowCaller<C> caller(adapter, step);
         typename Of::Stages k;
         typename Of::Values of(step);
         if constexpr (Of::ours) {
             Of::depart(caller, k.data(), h, of, with_error);
         } else {
-            Of::depart(caller, Of::at(door).advancing, h, of, with_error);
+            Of::depart(caller, Of::at(adapter).advancing, h, of, with_error);
         }
         const bool finite = Of::end(caller, h, of);
         Of::store(step, k, of);
@@ -48,15 +48,15 @@ class KernelOf {
         return 0;
     }
 
-    static bool take(void* door, State& step, double h)
+    static bool take(void* adapter, State& step, double h)
     {
-        const double ratio = attempt(door, step, h, -1, 0);
+        const double ratio = attempt(adapter, step, h, -1, 0);
         return ratio == ratio;
     }
 
-    RICOCHET_BY_ONES static void depart_only(void* door, State& step, double s, C& w, C& rate)
+    RICOCHET_BY_ONES static void depart_only(void* adapter, State& step, double s, C& w, C& rate)
     {
-        FlowCaller<C> caller(door, step);
+        FlowCaller<C> caller(adapter, step);
         typename Of::Values of(step);
         if constexpr (Of::ours) {
             typename Of::Stages k;
@@ -64,25 +64,25 @@ class KernelOf {
             Of::put(of.w, w);
             if constexpr (is_fsal<Stepper>) Of::put(of.w_rate, rate);
         } else {
-            Of::depart(caller, Of::at(door).probing, s, of, false);
+            Of::depart(caller, Of::at(adapter).probing, s, of, false);
             copy_state(of.w, w);
             if constexpr (is_fsal<Stepper>) copy_state(of.w_rate, rate);
         }
         caller.leave(step);
     }
 
-    static void departure(void* door, const State& step, double s, C& w)
+    static void departure(void* adapter, const State& step, double s, C& w)
     {
         const X zero = Of::own_copy(step.zero);
         X out = zero;
-        Of::at(door).advancing.calc_state(s, out, zero, zero, 0.0, Of::own_copy(step.w),
-                                          Of::own_copy(step.w_rate1), step.h);
+        Of::at(adapter).advancing.calc_state(s, out, zero, zero, 0.0, Of::own_copy(step.w),
+                                             Of::own_copy(step.w_rate1), step.h);
         copy_state(out, w);
     }
 
-    static void renew(void* door)
+    static void renew(void* adapter)
     {
-        for (Stepper* stepper : {&Of::at(door).advancing, &Of::at(door).probing}) {
+        for (Stepper* stepper : {&Of::at(adapter).advancing, &Of::at(adapter).probing}) {
             if constexpr (std::is_trivially_destructible_v<Stepper>) {
                 ::new (stepper) Stepper();  // an assignment would copy what is not yet written
             } else {

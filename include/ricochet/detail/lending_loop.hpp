@@ -25,7 +25,7 @@ public:
 /// Keeps a copy of `setup`, which has a quiet kernel on series. After an exception the run is over.
 /// @throws std::invalid_argument as `Simulation` does
 template <class X>
-[[nodiscard]] std::unique_ptr<LendingLoop<X>> make_lending_loop(const RunSetup<X>& setup,
+[[nodiscard]] std::unique_ptr<LendingLoop<X>> make_lending_loop(const RunBindings<X>& setup,
                                                                 const X& x0,
                                                                 const Options& options);
 

@@ -54,7 +54,7 @@ public:
 /// @param cuts_at_all  guards without a reset cut the step, too
 /// @throws std::invalid_argument as `EventMonitor` does
 template <class X>
-[[nodiscard]] Owner<AnyMonitor<X>> make_monitor(const RunSetup<X>& setup, const X& like,
+[[nodiscard]] Owner<AnyMonitor<X>> make_monitor(const RunBindings<X>& setup, const X& like,
                                                 const Options& options, bool cuts_at_all);
 
 }  // namespace ricochet::detail

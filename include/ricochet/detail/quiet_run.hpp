@@ -52,6 +52,6 @@ struct QuietRun {
 };
 
 template <class X>
-using QuietKernel = void (*)(void* door, StepState<X>& step, QuietRun& run);
+using QuietKernel = void (*)(void* adapter, StepState<X>& step, QuietRun& run);
 
 }  // namespace ricochet::detail

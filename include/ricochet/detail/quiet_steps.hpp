@@ -39,7 +39,7 @@ public:
     };
 
     // References to variables of the caller: as members they would not all be in registers.
-    void* door;
+    void* adapter;
     StepState<C>& step;
     QuietRun& run;
     FlowCaller<C>& caller;
@@ -48,14 +48,14 @@ public:
     Samples& at;
     double& h;
 
-    RICOCHET_BY_ONES static void go(void* door, StepState<C>& step, QuietRun& run)
+    RICOCHET_BY_ONES static void go(void* adapter, StepState<C>& step, QuietRun& run)
     {
-        FlowCaller<C> caller(door, step);
+        FlowCaller<C> caller(adapter, step);
         Values of(step);
         Stages k;
         Samples at{.sign = run.sign, .g0 = run.g0, .rate0 = run.rate0};
         double h = run.h_next;
-        QuietSteps steps{door, step, run, caller, of, k, at, h};
+        QuietSteps steps{adapter, step, run, caller, of, k, at, h};
         run.why = QuietEnd::due;
         run.repeated = false;
         double next = h;
@@ -136,10 +136,10 @@ private:
         const GuardInMode of_run{.mode = caller.mode, .backward = caller.backward};
         if constexpr (std::is_same_v<System, ByPointer>) {
             static constexpr GuardInfo unused{};
-            const SystemAt<C> system(*static_cast<const SystemTable<C>*>(run.system), door);
+            const SystemAt<C> system(*static_cast<const SystemTable<C>*>(run.system), adapter);
             return CoreGuard<C>(system, run.guard_calls, of_run, unused);
         } else {
-            return GuardView<System, X>(Of::at(door).system(), run.guard_calls, of_run);
+            return GuardView<System, X>(Of::at(adapter).system(), run.guard_calls, of_run);
         }
     }
 

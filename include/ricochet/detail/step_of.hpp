@@ -20,7 +20,7 @@
 
 #include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/detail/flow_caller.hpp"
-#include "ricochet/detail/stepper_door.hpp"
+#include "ricochet/detail/stepper_adapter.hpp"
 #include "ricochet/methods.hpp"
 #include "ricochet/step_control.hpp"
 
@@ -52,9 +52,10 @@ struct StepOf {
     static constexpr bool ours = Departing<Stepper>;
     static_assert(fits_registers<X> || !ours, "the library has the kernels of large states");
 
-    [[nodiscard]] static auto& at(void* door) noexcept
+    [[nodiscard]] static auto& at(void* adapter) noexcept
     {
-        return *static_cast<StepperDoor<System, X, Method>*>(static_cast<Door<System, X>*>(door));
+        return *static_cast<StepperAdapter<System, X, Method>*>(
+            static_cast<SystemAdapter<System, X>*>(adapter));
     }
 
     using Caller = FlowCaller<C>;
@@ -75,16 +76,16 @@ struct StepOf {
     [[gnu::always_inline]] static bool call_by_reference(const Caller& caller, double t, const X& x,
                                                          X& dxdt)
     {
-        [[maybe_unused]] void* const door = caller.door;
+        [[maybe_unused]] void* const adapter = caller.adapter;
         [[maybe_unused]] const Mode mode = caller.mode;
         if constexpr (std::is_same_v<System, ByPointer>) {
             C there = as_core(x);
             C rate(fixed_size<X>());
-            const bool fits = caller.flow(door, mode, t, there, rate);
+            const bool fits = caller.flow(adapter, mode, t, there, rate);
             put(rate, dxdt);
             return fits;
         } else {
-            return call_flow(at(door).system(), mode, t, x, dxdt);
+            return call_flow(at(adapter).system(), mode, t, x, dxdt);
         }
     }
 

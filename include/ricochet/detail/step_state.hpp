@@ -69,7 +69,7 @@ struct StepState {
     }
 
     /// Flow of the system, for kernels that do not have it inlined; see `SystemTable::flow`.
-    bool (*flow)(void* door, Mode mode, double t, const X& x, X& dxdt) = nullptr;
+    bool (*flow)(void* adapter, Mode mode, double t, const X& x, X& dxdt) = nullptr;
 
     Instant start;
     Mode mode = 0;
@@ -140,39 +140,41 @@ struct StepKernel {
 
     /// Takes a step of length h: `w`, `x1`, `rate1`, and `stages` where they have an interpolant.
     /// False: the end or the flow there is not finite.
-    bool (*take)(void* door, StepState<X>& step, double h) = nullptr;
+    bool (*take)(void* adapter, StepState<X>& step, double h) = nullptr;
     /// Takes a step like `take`. Returns its largest estimated error over atol + rtol max(|x0|,
     /// |x1|); NaN if anything is not finite. Null without an estimate.
-    double (*attempt)(void* door, StepState<X>& step, double h, double rtol, double atol) = nullptr;
+    double (*attempt)(void* adapter, StepState<X>& step, double h, double rtol,
+                      double atol) = nullptr;
     /// The departure after a step of length s, with its rate where the method computes it; the
     /// current step is unchanged.
-    void (*depart)(void* door, StepState<X>& step, double s, X& w, X& rate) = nullptr;
+    void (*depart)(void* adapter, StepState<X>& step, double s, X& w, X& rate) = nullptr;
     /// How far a step from here may go, of which a length h is asked for: up to a change that the
     /// stepper locates, or as far as the tolerance is met for certain. Null where that is known
     /// only afterwards.
-    double (*reach)(void* door, StepState<X>& step, double h, double rtol, double atol) = nullptr;
+    double (*reach)(void* adapter, StepState<X>& step, double h, double rtol,
+                    double atol) = nullptr;
     /// Whether the current step ends at a change that the stepper has located by itself. Null where
     /// it locates none.
-    bool (*ends_at_change)(void* door, const StepState<X>& step) = nullptr;
+    bool (*ends_at_change)(void* adapter, const StepState<X>& step) = nullptr;
     /// w(s) on an interpolant of the method's own, or null.
-    void (*departure)(void* door, const StepState<X>& step, double s, X& w) = nullptr;
+    void (*departure)(void* adapter, const StepState<X>& step, double s, X& w) = nullptr;
     /// w(s) for a sample, on an interpolant of the order of the method that takes further work
     /// once a step. False where that is not within the tolerance, and the sample needs a step of
     /// its own. Null: the method has none.
-    bool (*sample)(void* door, StepState<X>& step, double s, double rtol, double atol,
+    bool (*sample)(void* adapter, StepState<X>& step, double s, double rtol, double atol,
                    X& w) = nullptr;
     /// The current step where it is a power series, or null.
-    SeriesTerms (*series)(void* door, const StepState<X>& step) = nullptr;
+    SeriesTerms (*series)(void* adapter, const StepState<X>& step) = nullptr;
     /// Largest error of the current step's polynomial inside the step, over atol + rtol max(|x0|,
     /// |x1|). Null where the step's own error limits it.
-    double (*roughness)(void* door, StepState<X>& step, double rtol, double atol) = nullptr;
+    double (*roughness)(void* adapter, StepState<X>& step, double rtol, double atol) = nullptr;
     /// All guards as power series on it, or null.
-    SeriesTerms (*guard_series)(void* door, const StepState<X>& step) = nullptr;
+    SeriesTerms (*guard_series)(void* adapter, const StepState<X>& step) = nullptr;
     /// Locates a crossing by a guard's series, and leaves the state there in `at`; false where that
     /// is not certain. Null where guards have no series.
-    bool (*cross)(void* door, StepState<X>& step, SeriesCrossing& crossing) = nullptr;
+    bool (*cross)(void* adapter, StepState<X>& step, SeriesCrossing& crossing) = nullptr;
     /// Called when the state has another dimension. Null where nothing is kept.
-    void (*renew)(void* door) = nullptr;
+    void (*renew)(void* adapter) = nullptr;
 
     [[nodiscard]] bool interpolates() const noexcept { return is_dopri5 || departure; }
 };

@@ -2,9 +2,9 @@
 //
 // A system as a table of pointers to functions, whatever form they have, for the loop.
 //
-// Functions that a system does not have are null. Each takes the door first, which holds the
-// system (detail/door.hpp). Rates are with respect to the offset in a step: in a run backward in
-// time they have the opposite sign.
+// Functions that a system does not have are null. Each takes the adapter first, which holds the
+// system (detail/system_adapter.hpp). Rates are with respect to the offset in a step: in a run
+// backward in time they have the opposite sign.
 #pragma once
 
 #include <cmath>
@@ -40,7 +40,7 @@ struct PhaseTable;
 
 template <class X>
 struct SystemTable {
-    using Door = void*;
+    using SystemAdapter = void*;
     using View = PolynomialView<X, false>;
     using RateView = PolynomialView<X, true>;
 
@@ -56,57 +56,61 @@ struct SystemTable {
     bool bounded = false;
 
     /// False: the flow has given its rate another dimension, and the rate is now NaN.
-    bool (*flow)(Door, Mode, double t, const X& x, X& dxdt) = nullptr;
-    std::size_t (*mode_count)(Door) = nullptr;   ///< 0: not declared
-    std::size_t (*guard_count)(Door) = nullptr;  ///< 0 where it has none
-    std::string (*name)(Door) = nullptr;
-    GuardInfo (*info)(Door, std::size_t which) = nullptr;
+    bool (*flow)(SystemAdapter, Mode, double t, const X& x, X& dxdt) = nullptr;
+    std::size_t (*mode_count)(SystemAdapter) = nullptr;   ///< 0: not declared
+    std::size_t (*guard_count)(SystemAdapter) = nullptr;  ///< 0 where it has none
+    std::string (*name)(SystemAdapter) = nullptr;
+    GuardInfo (*info)(SystemAdapter, std::size_t which) = nullptr;
 
     /// All guards.
-    void (*guards)(Door, Mode, double t, const X& x, std::span<double> g) = nullptr;
+    void (*guards)(SystemAdapter, Mode, double t, const X& x, std::span<double> g) = nullptr;
     /// One guard, at a state or a view of the step's polynomial.
-    double (*guard)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
-    double (*guard_on)(Door, std::size_t which, Mode, double t, const View& x) = nullptr;
+    double (*guard)(SystemAdapter, std::size_t which, Mode, double t, const X& x) = nullptr;
+    double (*guard_on)(SystemAdapter, std::size_t which, Mode, double t, const View& x) = nullptr;
     /// Rate of a guard with x' = dxdt: in closed form, else the central difference over 1e-5
     /// `scale` (near an end of the run `CoreGuard` takes another one), at the cost of
     /// `calls_of_rate` evaluations of the guard.
-    double (*rate)(Door, GuardInMode, ScaledTime, const X& x, const X& dxdt) = nullptr;
-    double (*rate_on)(Door, GuardInMode, ScaledTime, const View& x, const RateView& dxdt) = nullptr;
+    double (*rate)(SystemAdapter, GuardInMode, ScaledTime, const X& x, const X& dxdt) = nullptr;
+    double (*rate_on)(SystemAdapter, GuardInMode, ScaledTime, const View& x,
+                      const RateView& dxdt) = nullptr;
     unsigned calls_of_rate = 0;
     /// Value and rate in one call. Null where a system computes guards or rates all together.
-    GuardPoint (*point)(Door, GuardInMode, ScaledTime, const X& x, const X& dxdt) = nullptr;
+    GuardPoint (*point)(SystemAdapter, GuardInMode, ScaledTime, const X& x,
+                        const X& dxdt) = nullptr;
     /// All rates, from one call of the system, with respect to the time itself.
-    void (*rates)(Door, const Along<X>&, std::span<double> rates) = nullptr;
+    void (*rates)(SystemAdapter, const Along<X>&, std::span<double> rates) = nullptr;
     /// All rates, with a call for each guard, with respect to the time itself.
-    void (*each_rate)(Door, const Along<X>&, std::span<double> rates) = nullptr;
+    void (*each_rate)(SystemAdapter, const Along<X>&, std::span<double> rates) = nullptr;
 
-    bool (*enabled_in)(Door, std::size_t which, Mode) = nullptr;
-    bool (*enabled_at)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
-    Mode (*reset)(Door, std::size_t which, Mode, double t, X& x) = nullptr;
+    bool (*enabled_in)(SystemAdapter, std::size_t which, Mode) = nullptr;
+    bool (*enabled_at)(SystemAdapter, std::size_t which, Mode, double t, const X& x) = nullptr;
+    Mode (*reset)(SystemAdapter, std::size_t which, Mode, double t, X& x) = nullptr;
     /// Called before `reset`: the direction in which the guard has crossed. Null where resets do
     /// not ask for it.
-    void (*tell_direction)(Door, Crossing) = nullptr;
-    Mode (*reset_set)(Door, const FiredGuards&, Mode, double t, X& x) = nullptr;
+    void (*tell_direction)(SystemAdapter, Crossing) = nullptr;
+    Mode (*reset_set)(SystemAdapter, const FiredGuards&, Mode, double t, X& x) = nullptr;
     /// Called after all resets of a set, with the mode before them; gives the mode after the set.
-    Mode (*after_set)(Door, const FiredGuards&, Mode, double t, const X& before, X& x) = nullptr;
-    Mode (*rest)(Door, std::size_t which, Mode, double t, X& x) = nullptr;
+    Mode (*after_set)(SystemAdapter, const FiredGuards&, Mode, double t, const X& before,
+                      X& x) = nullptr;
+    Mode (*rest)(SystemAdapter, std::size_t which, Mode, double t, X& x) = nullptr;
     /// Whether `rest` has an answer for a guard whose events accumulate together with those of
     /// another one, or of `no_guard`. Null: always.
-    bool (*rests)(Door, std::size_t which, std::size_t other) = nullptr;
+    bool (*rests)(SystemAdapter, std::size_t which, std::size_t other) = nullptr;
 
-    double (*next_time_event)(Door, double t) = nullptr;
-    double (*previous_time_event)(Door, double t) = nullptr;
+    double (*next_time_event)(SystemAdapter, double t) = nullptr;
+    double (*previous_time_event)(SystemAdapter, double t) = nullptr;
     /// Asked at the start and after every set instead of `next_time_event`; may answer t.
-    double (*next_time_event_at)(Door, Mode, double t, const X& x) = nullptr;
+    double (*next_time_event_at)(SystemAdapter, Mode, double t, const X& x) = nullptr;
     /// How often t is listed, for systems with `Times`; null for others.
-    std::size_t (*time_event_count)(Door, double t) = nullptr;
-    Mode (*time_reset)(Door, Mode, double t, X& x) = nullptr;
+    std::size_t (*time_event_count)(SystemAdapter, double t) = nullptr;
+    Mode (*time_reset)(SystemAdapter, Mode, double t, X& x) = nullptr;
 
-    double (*lipschitz)(Door, std::size_t which) = nullptr;
-    double (*speed_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
-    double (*acceleration_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
-    double (*lower_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
-    double (*upper_bound)(Door, std::size_t which, Mode, double t, const X& x) = nullptr;
+    double (*lipschitz)(SystemAdapter, std::size_t which) = nullptr;
+    double (*speed_bound)(SystemAdapter, std::size_t which, Mode, double t, const X& x) = nullptr;
+    double (*acceleration_bound)(SystemAdapter, std::size_t which, Mode, double t,
+                                 const X& x) = nullptr;
+    double (*lower_bound)(SystemAdapter, std::size_t which, Mode, double t, const X& x) = nullptr;
+    double (*upper_bound)(SystemAdapter, std::size_t which, Mode, double t, const X& x) = nullptr;
 
     /// Null: the motion is that of the flow throughout.
     const PhaseTable<X>* phases = nullptr;
@@ -134,13 +138,13 @@ struct RunSpan {
     }
 };
 
-/// A table and the door that its functions take.
+/// A table and the adapter that its functions take.
 template <class X>
 class SystemAt {
 public:
     /// @param span  null: functions may be called at any time
-    SystemAt(const SystemTable<X>& table, void* door, RunSpan<X>* span = nullptr) noexcept
-        : table_(&table), door_(door), span_(span)
+    SystemAt(const SystemTable<X>& table, void* adapter, RunSpan<X>* span = nullptr) noexcept
+        : table_(&table), adapter_(adapter), span_(span)
     {
     }
 
@@ -154,16 +158,16 @@ public:
     }
 
     [[nodiscard]] const SystemTable<X>* operator->() const noexcept { return table_; }
-    [[nodiscard]] void* door() const noexcept { return door_; }
+    [[nodiscard]] void* adapter() const noexcept { return adapter_; }
 
-    [[nodiscard]] std::size_t modes() const { return table_->mode_count(door_); }
+    [[nodiscard]] std::size_t modes() const { return table_->mode_count(adapter_); }
     [[nodiscard]] bool enabled_in(std::size_t which, Mode mode) const
     {
-        return !table_->enabled_in || table_->enabled_in(door_, which, mode);
+        return !table_->enabled_in || table_->enabled_in(adapter_, which, mode);
     }
     [[nodiscard]] bool enabled_at(std::size_t which, Mode mode, double t, const X& x) const
     {
-        return !table_->enabled_at || table_->enabled_at(door_, which, mode, t, x);
+        return !table_->enabled_at || table_->enabled_at(adapter_, which, mode, t, x);
     }
 
     /// Whether a reset may leave `after` where the state was `before`.
@@ -182,11 +186,11 @@ private:
     static constexpr double infinite = std::numeric_limits<double>::infinity();
 
     const SystemTable<X>* table_;
-    void* door_;
+    void* adapter_;
     RunSpan<X>* span_;
 };
 
-/// One guard of a system in one mode, for probes: as `GuardView`, but through the door.
+/// One guard of a system in one mode, for probes: as `GuardView`, but through the adapter.
 template <class X>
 class CoreGuard {
     using View = PolynomialView<X, false>;
@@ -218,12 +222,12 @@ public:
     [[nodiscard]] double value(double t, const X& x) const
     {
         ++*calls_;
-        return system_->guard(system_.door(), at_.which, at_.mode, t, x);
+        return system_->guard(system_.adapter(), at_.which, at_.mode, t, x);
     }
     [[nodiscard]] double value(double t, const View& x) const
     {
         ++*calls_;
-        return system_->guard_on(system_.door(), at_.which, at_.mode, t, x);
+        return system_->guard_on(system_.adapter(), at_.which, at_.mode, t, x);
     }
     /// @param g  the value there, where it is known
     [[nodiscard]] double rate(double t, const X& x, const X& dxdt, double scale,
@@ -231,7 +235,7 @@ public:
     {
         if (is_cut(t, scale)) return rate_inside(t, x, dxdt, scale, g == g ? g : value(t, x));
         *calls_ += system_->calls_of_rate;
-        return system_->rate(system_.door(), at_, {t, scale}, x, dxdt);
+        return system_->rate(system_.adapter(), at_, {t, scale}, x, dxdt);
     }
     [[nodiscard]] double raw_rate(double t, const X& x, const X& dxdt, double scale) const
     {
@@ -246,11 +250,11 @@ public:
         }
         if (!system_->point) return {value(t, x), rate(t, x, dxdt, scale)};
         *calls_ += 1 + system_->calls_of_rate;
-        return system_->point(system_.door(), at_, {t, scale}, x, dxdt);
+        return system_->point(system_.adapter(), at_, {t, scale}, x, dxdt);
     }
     [[nodiscard]] double rate(double t, const View& x, const RateView& dxdt, double scale) const
     {
-        return system_->rate_on(system_.door(), at_, {t, scale}, x, dxdt);
+        return system_->rate_on(system_.adapter(), at_, {t, scale}, x, dxdt);
     }
 
 private:

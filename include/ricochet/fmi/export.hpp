@@ -63,7 +63,7 @@ namespace detail {
 using ricochet::detail::copy_state;
 using ricochet::detail::core_state;
 using ricochet::detail::CoreState;
-using ricochet::detail::Door;
+using ricochet::detail::SystemAdapter;
 
 template <class Model>
 using SystemOf = std::remove_cvref_t<decltype(Model::make(std::span<const double>()))>;
@@ -310,8 +310,8 @@ private:
         if constexpr (requires { Model::inputs; }) Model::set_inputs(*system_, inputs);
         changed = false;
         if constexpr (exchanges) {
-            door_.emplace(*system_, state());
-            exchange_.bind(ricochet::detail::system_table<System, X>, &*door_, x.size());
+            adapter_.emplace(*system_, state());
+            exchange_.bind(ricochet::detail::system_table<System, X>, &*adapter_, x.size());
         }
     }
 
@@ -375,7 +375,7 @@ private:
     }
 
     std::optional<System> system_;
-    std::optional<Door<System, X>> door_;
+    std::optional<SystemAdapter<System, X>> adapter_;
     Exchange<C> exchange_;
     std::unique_ptr<Run> run_;
     bool waits_ = false, stops_ = false;

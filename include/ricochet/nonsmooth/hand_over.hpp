@@ -191,20 +191,20 @@ private:
     static void set_modes(PhasedSetup<C>& out)
     {
         if constexpr (StartsInMode<System, X>) {
-            out.start_mode = [](void* door, Mode mode, double t, const C& x) -> Mode {
-                auto& of = *static_cast<Door<System, X>*>(door);
+            out.start_mode = [](void* adapter, Mode mode, double t, const C& x) -> Mode {
+                auto& of = *static_cast<SystemAdapter<System, X>*>(adapter);
                 return of.system().start_mode(mode, t, of.read(x, 0));
             };
         } else if constexpr (StartsMode<System, X>) {
-            out.start_mode = [](void* door, Mode, double t, const C& x) -> Mode {
-                auto& of = *static_cast<Door<System, X>*>(door);
+            out.start_mode = [](void* adapter, Mode, double t, const C& x) -> Mode {
+                auto& of = *static_cast<SystemAdapter<System, X>*>(adapter);
                 return of.system().start_mode(t, of.read(x, 0));
             };
         }
         if constexpr (ChangesMode<System, X> || ChangesState<System, X>) {
-            out.change = [](void* door, std::size_t reaction, EventKind kind, Mode mode, double t,
-                            C& x) -> Mode {
-                auto& of = *static_cast<Door<System, X>*>(door);
+            out.change = [](void* adapter, std::size_t reaction, EventKind kind, Mode mode,
+                            double t, C& x) -> Mode {
+                auto& of = *static_cast<SystemAdapter<System, X>*>(adapter);
                 return of.edit(x, [&](X& state) -> Mode {
                     if constexpr (ChangesMode<System, X>) {
                         return of.system().change(reaction, kind, mode, t, state);
@@ -248,8 +248,8 @@ requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
     static_assert(detail::nonsmooth_is_linked<System>,
                   "ricochet: found a system with set_valued(), and a target that does not link "
                   "ricochet::nonsmooth; expected it to, or RICOCHET_WITH_NONSMOOTH to be defined");
-    detail::PartsOfRun<System, X, Stepping, Detector, Locator> parts(system, x0, stepping, detector,
-                                                                     locator);
+    detail::RunComponents<System, X, Stepping, Detector, Locator> parts(system, x0, stepping,
+                                                                        detector, locator);
     const detail::LoopOf<System, X, Stepping, Detector> loop(system, parts, x0, options);
     return detail::as_callers<X>(loop->take(), x0);
 }

@@ -83,7 +83,7 @@ template <class System, class X, bool wide, class SystemOf, class Detector, clas
 class LaneRuns {
     static_assert(has_flow_alone<System>());
     using Stepping = ErrorControlled<Taylor>;
-    using Parts = PartsOfRun<System, X, Stepping, Detector, Locator>;
+    using Parts = RunComponents<System, X, Stepping, Detector, Locator>;
     using C = CoreState<X>;
     using Lanes = TaylorLanes<System, X, wide>;
 
@@ -140,8 +140,9 @@ private:
         slot.loop.reset();
         slot.parts.emplace(system_of_(slot.row), x0, stepping_, detector_, locator_);
         const auto setup = slot.parts->setup();
-        const auto& door = static_cast<const typename Lanes::Door&>(slot.parts->door());
-        if (!setup.quiet || !door.as_compiled()) {
+        const auto& adapter =
+            static_cast<const typename Lanes::SystemAdapter&>(slot.parts->adapter());
+        if (!setup.quiet || !adapter.as_compiled()) {
             results_.keep(slot.row, as_callers<X>(run_whole(setup, core_state(x0), options_), x0));
             return;
         }
@@ -153,8 +154,8 @@ private:
     void go_on(Slot& slot, std::size_t lane, bool beyond)
     {
         if (slot.loop->go_to_quiet_steps(slot.quiet, beyond)) {
-            auto& door = static_cast<typename Lanes::Door&>(slot.parts->door());
-            lanes_.load(lane, door, slot.loop->lend(), slot.quiet);
+            auto& adapter = static_cast<typename Lanes::SystemAdapter&>(slot.parts->adapter());
+            lanes_.load(lane, adapter, slot.loop->lend(), slot.quiet);
         } else {
             end(slot);
         }

@@ -31,8 +31,8 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detail/stepper_door.hpp"
-#include "ricochet/taylor/detail/taylor_door.hpp"
+#include "ricochet/detail/stepper_adapter.hpp"
+#include "ricochet/taylor/detail/taylor_adapter.hpp"
 #include "ricochet/taylor/detail/taylor_kernel.hpp"
 
 namespace ricochet {
@@ -64,8 +64,8 @@ concept UnrolledSeries = detail::ConstantFlow < System,
 namespace detail {
 
 template <class System, class X>
-struct StepperDoor<System, X, Taylor> : TaylorDoor<System, X, fixed_size<X>()> {
-    using TaylorDoor<System, X, fixed_size<X>()>::TaylorDoor;
+struct StepperAdapter<System, X, Taylor> : TaylorAdapter<System, X, fixed_size<X>()> {
+    using TaylorAdapter<System, X, fixed_size<X>()>::TaylorAdapter;
 
     void prepare(const Taylor& method) { this->prepare_order(method.order); }
 };
@@ -84,8 +84,8 @@ struct TaylorOf {
     using Stepper = Taylor::Stepper<State>;
 };
 template <class System, class X, std::size_t n>
-struct StepperDoor<System, X, TaylorOf<n>> : TaylorDoor<System, X, n> {
-    using TaylorDoor<System, X, n>::TaylorDoor;
+struct StepperAdapter<System, X, TaylorOf<n>> : TaylorAdapter<System, X, n> {
+    using TaylorAdapter<System, X, n>::TaylorAdapter;
 
     void prepare(const TaylorOf<n>& method) { this->prepare_order(method.order); }
 };
@@ -93,10 +93,10 @@ template <class System, class X, std::size_t n>
 class KernelOf<System, X, TaylorOf<n>> : public TaylorKernel<System, X, n> {
 };
 
-/// Lets a run whose door is a `TaylorDoor`, and whose detector is known, take its steps by power
-/// series. Quiet runs are of one guard at most, which the detector would check at every step.
+/// Lets a run whose adapter is a `TaylorAdapter`, and whose detector is known, take its steps by
+/// power series. Quiet runs are of one guard at most, which the detector would check at every step.
 template <class System, class X, std::size_t n>
-void step_by_series(RunSetup<CoreState<X>>& setup)
+void step_by_series(RunBindings<CoreState<X>>& setup)
 {
     using Method = TaylorOf<n>;
     using Kernel = KernelOf<System, X, Method>;
@@ -107,7 +107,7 @@ void step_by_series(RunSetup<CoreState<X>>& setup)
     const bool proves = detector.screening == detail::Screening::extremum ||
                         detector.screening == detail::Screening::every;
     const bool alone = Kernel::on_series && proves && !detector.clears && !detector.defers &&
-                       setup.system->guard_count(setup.door) == 1;
+                       setup.system->guard_count(setup.adapter) == 1;
     if (!setup.system->guarded || alone) {
         setup.quiet = setup.error_controlled ? Kernel::template quiet<true>()
                                              : Kernel::template quiet<false>();

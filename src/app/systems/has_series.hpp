@@ -2,7 +2,7 @@
 #pragma once
 
 #include "ricochet/detail/components.hpp"
-#include "ricochet/taylor/detail/taylor_door.hpp"
+#include "ricochet/taylor/detail/taylor_adapter.hpp"
 
 namespace ricochet::app {
 

@@ -160,7 +160,7 @@ struct SeriesSteps {
     static constexpr std::size_t n = detail::fixed_size<typename System::State>();
     using Method = detail::TaylorOf<n>;
 
-    static void take(detail::RunSetup<detail::CoreState<X>>& setup)
+    static void take(detail::RunBindings<detail::CoreState<X>>& setup)
     {
         detail::step_by_series<System, X, n>(setup);
     }
@@ -173,14 +173,15 @@ template <class Steps, class System, class X>
 {
     using Method = typename Steps::Method;
     using Core = detail::CoreState<X>;
-    using Parts = detail::PartsOfRun<System, X, ErrorControlled<Method>, Extremum, ChosenLocator>;
+    using Parts =
+        detail::RunComponents<System, X, ErrorControlled<Method>, Extremum, ChosenLocator>;
     return with_detector<System, X>(settings, [&](const ChosenDetector<Core>& chosen) {
         Run<Core> run;
         const X from = chosen_start(x0, settings);
         const auto start = std::chrono::steady_clock::now();
         for (int i = 0; i < repeats; ++i) {
             Parts parts(system, from, {method}, {}, {settings.locator});
-            detail::RunSetup<Core> setup = parts.setup();
+            detail::RunBindings<Core> setup = parts.setup();
             setup.error_controlled = !settings.fixed_step;
             setup.detector = chosen.table;
             setup.detecting = chosen.detector;

@@ -25,11 +25,11 @@ public:
     CallbackSetup(std::shared_ptr<const CallbackSystem> system, const X& like,
                   const FinderOptions& finders)
         : system_(std::move(system)),
-          door_(*system_, like),
+          adapter_(*system_, like),
           table_(CallbackTable<X>::make(*system_))
     {
         setup_.system = &table_;
-        setup_.door = static_cast<detail::Door<CallbackSystem, X>*>(&door_);
+        setup_.adapter = static_cast<detail::SystemAdapter<CallbackSystem, X>*>(&adapter_);
         set_detector(finders);
         set_locator(finders.locator);
     }
@@ -37,7 +37,7 @@ public:
     CallbackSetup& operator=(const CallbackSetup&) = delete;
 
     /// Without a method. Refers to this object.
-    [[nodiscard]] const detail::RunSetup<X>& setup() const noexcept { return setup_; }
+    [[nodiscard]] const detail::RunBindings<X>& setup() const noexcept { return setup_; }
 
 private:
     template <class Detector>
@@ -61,10 +61,10 @@ private:
     }
 
     std::shared_ptr<const CallbackSystem> system_;
-    CallbackDoor<X> door_;
+    CallbackAdapter<X> adapter_;
     detail::SystemTable<X> table_;
     std::shared_ptr<const void> detector_;
-    detail::RunSetup<X> setup_;
+    detail::RunBindings<X> setup_;
 };
 
 template <class X>

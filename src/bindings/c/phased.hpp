@@ -18,7 +18,7 @@ namespace ricochet::c {
 /// @param user  of the system without its inclusion
 template <class X>
 [[nodiscard]] detail::Owner<detail::PhasedRun<X>> make_phased(
-    const std::shared_ptr<const CallbackSystem>& system, const detail::RunSetup<X>& user,
+    const std::shared_ptr<const CallbackSystem>& system, const detail::RunBindings<X>& user,
     const X& x0, const RunOptions& options)
 {
     require_options_of_phases(options);
@@ -36,16 +36,16 @@ template <class X>
         }
         setup.inclusions.push_back(std::move(phases));
     }
-    using D = detail::Door<CallbackSystem, X>;
+    using D = detail::SystemAdapter<CallbackSystem, X>;
     if (of.callbacks().start_mode) {
-        setup.start_mode = [](void* door, Mode mode, double t, const X& x) {
-            return static_cast<D*>(door)->system().start_mode(mode, t, x);
+        setup.start_mode = [](void* adapter, Mode mode, double t, const X& x) {
+            return static_cast<D*>(adapter)->system().start_mode(mode, t, x);
         };
     }
     if (of.callbacks().change) {
-        setup.change = [](void* door, std::size_t reaction, EventKind kind, Mode mode, double t,
+        setup.change = [](void* adapter, std::size_t reaction, EventKind kind, Mode mode, double t,
                           X& x) {
-            return static_cast<D*>(door)->system().change(reaction, kind, mode, t, x);
+            return static_cast<D*>(adapter)->system().change(reaction, kind, mode, t, x);
         };
     }
     return detail::make_phased_run(std::move(setup), x0, options.options);
@@ -55,7 +55,7 @@ template <class X>
 
 template <class X>
 [[nodiscard]] detail::Owner<detail::PhasedRun<X>> make_phased(
-    const std::shared_ptr<const CallbackSystem>&, const detail::RunSetup<X>&, const X&,
+    const std::shared_ptr<const CallbackSystem>&, const detail::RunBindings<X>&, const X&,
     const RunOptions&)
 {
     throw Refusal(RC_INVALID,

@@ -130,13 +130,13 @@ private:
         return goes_on;
     }
 
-    [[nodiscard]] detail::RunSetup<X> setup_of(std::size_t size, const RunOptions& options) const
+    [[nodiscard]] detail::RunBindings<X> setup_of(std::size_t size, const RunOptions& options) const
     {
         static const auto steppings = detail::NamedMethods::each([]<class Method>() {
             return std::array{detail::written_type<ErrorControlled<Method>>(),
                               detail::written_type<FixedStep<Method>>()};
         });
-        detail::RunSetup<X> setup = callbacks_.setup();
+        detail::RunBindings<X> setup = callbacks_.setup();
         setup.cancels_by_itself = true;
         const MethodName method = method_of(options.method);
         setup.error_controlled = !options.fixed_step;

@@ -77,14 +77,14 @@ public:
     explicit CallbackSource(PyObject* specification);
 
     /// @throws std::invalid_argument for a start that does not fit its formulas
-    [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override;
-    [[nodiscard]] std::unique_ptr<RunDoor> open_by_series(const State& x0) const override;
-    [[nodiscard]] std::unique_ptr<RunDoor> open_implicit(const State& x0) const override;
+    [[nodiscard]] std::unique_ptr<RunAdapter> open(const State& x0) const override;
+    [[nodiscard]] std::unique_ptr<RunAdapter> open_by_series(const State& x0) const override;
+    [[nodiscard]] std::unique_ptr<RunAdapter> open_implicit(const State& x0) const override;
     [[nodiscard]] std::vector<std::string> mode_names() const override;
     [[nodiscard]] std::vector<std::string> guard_names() const override;
 
 private:
-    friend class CallbackDoor;
+    friend class CallbackAdapter;
 
     void read_functions(PyObject* specification);
     void read_arguments(PyObject* specification);

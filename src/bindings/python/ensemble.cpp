@@ -46,8 +46,8 @@ struct Ensembled {
 /// A run by the general loop.
 Record run_loop(const Request& request, const Source& source, const State& x0)
 {
-    const std::unique_ptr<RunDoor> door = open_for(request, source, x0);
-    const OwnedSetup owned = setup_for(request, source, *door);
+    const std::unique_ptr<RunAdapter> adapter = open_for(request, source, x0);
+    const OwnedSetup owned = setup_for(request, source, *adapter);
     const auto loop = detail::make_loop(owned.setup, x0, request.options);
     while (!loop->ended()) loop->advance_once(true);
     return record_of(loop->finish());

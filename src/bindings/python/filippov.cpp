@@ -17,9 +17,9 @@ namespace ricochet::python {
 
 namespace {
 
-/// Doors to the caller's functions: one for each field, of which the first has the surfaces as its
-/// first guards, the guards of the fields behind them, and the time events.
-using Doors = std::vector<RunDoor*>;
+/// SystemAdapters to the caller's functions: one for each field, of which the first has the
+/// surfaces as its first guards, the guards of the fields behind them, and the time events.
+using SystemAdapters = std::vector<RunAdapter*>;
 
 /// The fields as `Filippov` takes them.
 template <std::size_t count>
@@ -29,54 +29,55 @@ public:
     using State = python::State;
     static constexpr std::size_t surface_count = count;
 
-    PlainFields(Doors doors, const Times* times) : doors_(std::move(doors)), times_(times)
+    PlainFields(SystemAdapters adapters, const Times* times)
+        : adapters_(std::move(adapters)), times_(times)
     {
-        guard_count = first().table().guard_count(first().door()) - count;
+        guard_count = first().table().guard_count(first().adapter()) - count;
     }
 
     std::size_t guard_count = 0;
 
     void field(std::size_t region, double t, const State& x, State& dxdt) const
     {
-        RunDoor& of = *doors_[region];
-        of.table().flow(of.door(), 0, t, x, dxdt);
+        RunAdapter& of = *adapters_[region];
+        of.table().flow(of.adapter(), 0, t, x, dxdt);
     }
     [[nodiscard]] double surface(std::size_t which, double t, const State& x) const
     {
-        return first().table().guard(first().door(), which, 0, t, x);
+        return first().table().guard(first().adapter(), which, 0, t, x);
     }
 
     [[nodiscard]] double guard(std::size_t which, double t, const State& x) const
     {
-        return first().table().guard(first().door(), count + which, 0, t, x);
+        return first().table().guard(first().adapter(), count + which, 0, t, x);
     }
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const
     {
-        return first().table().info(first().door(), count + which);
+        return first().table().info(first().adapter(), count + which);
     }
     [[nodiscard]] bool enabled(std::size_t which, double t, const State& x) const
     {
         const auto& table = first().table();
-        return !table.enabled_at || table.enabled_at(first().door(), count + which, 0, t, x);
+        return !table.enabled_at || table.enabled_at(first().adapter(), count + which, 0, t, x);
     }
     void reset(std::size_t which, double t, State& x) const
     {
         const auto& table = first().table();
-        if (table.reset) table.reset(first().door(), count + which, 0, t, x);
+        if (table.reset) table.reset(first().adapter(), count + which, 0, t, x);
     }
 
     [[nodiscard]] const Times& time_events() const noexcept { return *times_; }
     void time_reset(double t, State& x) const
     {
         const auto& table = first().table();
-        if (table.time_reset) table.time_reset(first().door(), 0, t, x);
+        if (table.time_reset) table.time_reset(first().adapter(), 0, t, x);
     }
 
 protected:
-    [[nodiscard]] RunDoor& first() const noexcept { return *doors_.front(); }
+    [[nodiscard]] RunAdapter& first() const noexcept { return *adapters_.front(); }
 
 private:
-    Doors doors_;
+    SystemAdapters adapters_;
     const Times* times_;
 };
 
@@ -89,15 +90,16 @@ public:
     [[nodiscard]] double surface_rate(std::size_t which, double t, const State& x,
                                       const State& dxdt) const
     {
-        RunDoor& of = this->first();
-        return of.table().rate(of.door(), {.which = which, .mode = 0}, {t, 1}, x, dxdt);
+        RunAdapter& of = this->first();
+        return of.table().rate(of.adapter(), {.which = which, .mode = 0}, {t, 1}, x, dxdt);
     }
 };
 
-/// What Python asks of the rules, and the door of a run.
-class FilippovDoor : public RunDoor {
+/// What Python asks of the rules, and the adapter of a run.
+class FilippovAdapter : public RunAdapter {
 public:
-    explicit FilippovDoor(std::vector<std::unique_ptr<RunDoor>> fields) : fields_(std::move(fields))
+    explicit FilippovAdapter(std::vector<std::unique_ptr<RunAdapter>> fields)
+        : fields_(std::move(fields))
     {
         // One watch for all, since a signal is shown to only one.
         for (std::size_t i = 1; i < fields_.size(); ++i) {
@@ -118,27 +120,27 @@ public:
     [[nodiscard]] virtual State shares(Mode mode, double t, const State& x) const = 0;
 
 protected:
-    [[nodiscard]] Doors doors() const
+    [[nodiscard]] SystemAdapters adapters() const
     {
-        Doors out;
+        SystemAdapters out;
         for (const auto& field : fields_) out.push_back(field.get());
         return out;
     }
 
 private:
-    std::vector<std::unique_ptr<RunDoor>> fields_;
+    std::vector<std::unique_ptr<RunAdapter>> fields_;
 };
 
 template <class Fields>
-class FilippovDoorOf final : public FilippovDoor {
+class FilippovAdapterOf final : public FilippovAdapter {
     using System = Filippov<Fields>;
 
 public:
-    FilippovDoorOf(std::vector<std::unique_ptr<RunDoor>> fields, const Times& times,
-                   double restoring_rate, const State& x0)
-        : FilippovDoor(std::move(fields)),
-          system_(Fields(doors(), &times), {.restoring_rate = restoring_rate}),
-          door_(system_, x0)
+    FilippovAdapterOf(std::vector<std::unique_ptr<RunAdapter>> fields, const Times& times,
+                      double restoring_rate, const State& x0)
+        : FilippovAdapter(std::move(fields)),
+          system_(Fields(adapters(), &times), {.restoring_rate = restoring_rate}),
+          adapter_(system_, x0)
     {
     }
 
@@ -146,7 +148,7 @@ public:
     {
         return detail::system_table<System, State>;
     }
-    [[nodiscard]] void* door() noexcept override { return &door_; }
+    [[nodiscard]] void* adapter() noexcept override { return &adapter_; }
     [[nodiscard]] Mode start_mode(double t, const State& x, double tolerance) const override
     {
         return system_.start_mode(t, x, tolerance);
@@ -159,16 +161,18 @@ public:
 
 private:
     System system_;
-    detail::Door<System, State> door_;
+    detail::SystemAdapter<System, State> adapter_;
 };
 
-[[nodiscard]] std::unique_ptr<FilippovDoor> make_door(const FilippovSource& source, const State& x0)
+[[nodiscard]] std::unique_ptr<FilippovAdapter> make_adapter(const FilippovSource& source,
+                                                            const State& x0)
 {
-    std::vector<std::unique_ptr<RunDoor>> fields;
+    std::vector<std::unique_ptr<RunAdapter>> fields;
     for (const auto& field : source.fields()) fields.push_back(field->open(x0));
-    const auto of = [&]<class Fields>(std::type_identity<Fields>) -> std::unique_ptr<FilippovDoor> {
-        return std::make_unique<FilippovDoorOf<Fields>>(std::move(fields), source.times(),
-                                                        source.restoring_rate(), x0);
+    const auto of =
+        [&]<class Fields>(std::type_identity<Fields>) -> std::unique_ptr<FilippovAdapter> {
+        return std::make_unique<FilippovAdapterOf<Fields>>(std::move(fields), source.times(),
+                                                           source.restoring_rate(), x0);
     };
     if (source.surfaces() == 1) {
         return source.is_rated() ? of(std::type_identity<RatedFields<1>>{})
@@ -192,14 +196,14 @@ FilippovSource::FilippovSource(std::vector<std::shared_ptr<const Source>> fields
     detail::check_restoring_rate(restoring_rate_);
 }
 
-std::unique_ptr<RunDoor> FilippovSource::open(const State& x0) const
+std::unique_ptr<RunAdapter> FilippovSource::open(const State& x0) const
 {
-    return make_door(*this, x0);
+    return make_adapter(*this, x0);
 }
 
-std::unique_ptr<RunDoor> FilippovSource::open_implicit(const State& x0) const
+std::unique_ptr<RunAdapter> FilippovSource::open_implicit(const State& x0) const
 {
-    return implicit_door(open(x0), x0);
+    return implicit_adapter(open(x0), x0);
 }
 
 std::vector<std::string> FilippovSource::guard_names() const
@@ -218,12 +222,12 @@ std::vector<std::string> FilippovSource::guard_names() const
 
 Mode FilippovSource::start_mode_at(double t, const State& x, double tolerance) const
 {
-    return make_door(*this, x)->start_mode(t, x, tolerance);
+    return make_adapter(*this, x)->start_mode(t, x, tolerance);
 }
 
 State FilippovSource::shares(Mode mode, double t, const State& x) const
 {
-    return make_door(*this, x)->shares(mode, t, x);
+    return make_adapter(*this, x)->shares(mode, t, x);
 }
 
 }  // namespace ricochet::python

@@ -32,8 +32,8 @@ public:
     [[nodiscard]] const Times& times() const noexcept { return times_; }
     [[nodiscard]] double restoring_rate() const noexcept { return restoring_rate_; }
 
-    [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override;
-    [[nodiscard]] std::unique_ptr<RunDoor> open_implicit(const State& x0) const override;
+    [[nodiscard]] std::unique_ptr<RunAdapter> open(const State& x0) const override;
+    [[nodiscard]] std::unique_ptr<RunAdapter> open_implicit(const State& x0) const override;
     [[nodiscard]] std::vector<std::string> mode_names() const override { return {}; }
     [[nodiscard]] std::vector<std::string> guard_names() const override;
 

@@ -1,13 +1,13 @@
-// A table of functions that passes every call on to another door.
+// A table of functions that passes every call on to another adapter.
 #pragma once
 
-#include "ricochet/detail/door.hpp"
+#include "ricochet/detail/system_adapter.hpp"
 #include "ricochet/detail/system_table.hpp"
 #include "source.hpp"
 
 namespace ricochet::python {
 
-/// Tables of doors to `System`, which knows the door that it stands before as `callbacks()`.
+/// Tables of adapters to `System`, which knows the adapter that it stands before as `callbacks()`.
 template <class System>
 class Forwarding {
     using Table = detail::SystemTable<State>;
@@ -16,10 +16,11 @@ class Forwarding {
     struct Function;
     template <class R, class... A, R (*Table::*member)(void*, A...)>
     struct Function<member> {
-        static R call(void* door, A... arguments)
+        static R call(void* adapter, A... arguments)
         {
-            RunDoor& to = static_cast<detail::Door<System, State>*>(door)->system().callbacks();
-            return (to.table().*member)(to.door(), arguments...);
+            RunAdapter& to =
+                static_cast<detail::SystemAdapter<System, State>*>(adapter)->system().callbacks();
+            return (to.table().*member)(to.adapter(), arguments...);
         }
     };
 

@@ -15,23 +15,23 @@ namespace ricochet::python {
 
 namespace {
 
-/// The system at the door of a run, with the functions that detectors use.
+/// The system at the adapter of a run, with the functions that detectors use.
 class AskedSystem {
 public:
-    AskedSystem(const Source& source, RunDoor& door)
-        : name(door.table().name(door.door())), source_(&source), door_(&door)
+    AskedSystem(const Source& source, RunAdapter& adapter)
+        : name(adapter.table().name(adapter.adapter())), source_(&source), adapter_(&adapter)
     {
     }
 
     void flow(Mode mode, double t, const State& x, State& dxdt) const
     {
-        (void)door_->table().flow(door_->door(), mode, t, x, dxdt);
+        (void)adapter_->table().flow(adapter_->adapter(), mode, t, x, dxdt);
     }
     [[nodiscard]] double guard(double /*t*/, const State& /*x*/) const { return 1; }
     [[nodiscard]] double speed_bound(double /*t*/, const State& /*x*/) const { return 0; }
     [[nodiscard]] std::size_t mode_count() const
     {
-        return door_->table().moded ? door_->table().mode_count(door_->door()) : 0;
+        return adapter_->table().moded ? adapter_->table().mode_count(adapter_->adapter()) : 0;
     }
     [[nodiscard]] std::optional<double> parameter(std::string_view of) const
     {
@@ -44,10 +44,10 @@ public:
 
 private:
     const Source* source_;
-    RunDoor* door_;
+    RunAdapter* adapter_;
 };
 
-/// A detector together with its system. The loop passes the door of the run, whose type the
+/// A detector together with its system. The loop passes the adapter of the run, whose type the
 /// detector does not know.
 template <class Detector>
 class At : public Detector {
@@ -83,11 +83,11 @@ public:
         if constexpr (std::is_same_v<Detector, BareNetwork>) {
             table.clears = [](const void* at, void*, const detail::StepState<State>& step,
                               std::uint64_t& calls) {
-                detail::Door<AskedSystem, State> door(from(at).system_, step.x0);
+                detail::SystemAdapter<AskedSystem, State> adapter(from(at).system_, step.x0);
                 const detail::GuardView<AskedSystem, State> guard(
                     from(at).system_, calls, {.mode = step.mode, .backward = step.backward});
                 return from(at).Detector::clears(
-                    guard, detail::StepToCome<AskedSystem, State>(door, step));
+                    guard, detail::StepToCome<AskedSystem, State>(adapter, step));
             };
         }
         out.setup.detecting = static_cast<const Detector*>(self.get());
@@ -104,16 +104,17 @@ private:
 };
 
 template <class Detector, class Asked>
-void detect_by(OwnedSetup& out, const Source& source, RunDoor& door, Asked&& asked)
+void detect_by(OwnedSetup& out, const Source& source, RunAdapter& adapter, Asked&& asked)
 {
-    const auto kept =
-        std::make_shared<const At<Detector>>(AskedSystem(source, door), std::forward<Asked>(asked));
+    const auto kept = std::make_shared<const At<Detector>>(AskedSystem(source, adapter),
+                                                           std::forward<Asked>(asked));
     kept->add_to(out, kept);
 }
 
 }  // namespace
 
-bool detect_by_gate(OwnedSetup& out, const Request& request, const Source& source, RunDoor& door)
+bool detect_by_gate(OwnedSetup& out, const Request& request, const Source& source,
+                    RunAdapter& adapter)
 {
     const std::string_view detector = request.detector;
     const auto model = [&] {
@@ -124,15 +125,15 @@ bool detect_by_gate(OwnedSetup& out, const Request& request, const Source& sourc
             std::string(detector) + "'");
     };
     if (detector == "calibrated") {
-        detect_by<Calibrated<>>(out, source, door, gates::Gate(model()));
+        detect_by<Calibrated<>>(out, source, adapter, gates::Gate(model()));
     } else if (detector == "calibrated-bounds") {
-        detect_by<CalibratedBounds<>>(out, source, door, gates::Gate(model()));
+        detect_by<CalibratedBounds<>>(out, source, adapter, gates::Gate(model()));
     } else if (detector == "foreseen") {
-        detect_by<Foreseen<>>(out, source, door, gates::Gate(model()));
+        detect_by<Foreseen<>>(out, source, adapter, gates::Gate(model()));
     } else if (detector == "certified") {
-        detect_by<Certified<>>(out, source, door, model());
+        detect_by<Certified<>>(out, source, adapter, model());
     } else if (detector == "network") {
-        detect_by<BareNetwork>(out, source, door, model());
+        detect_by<BareNetwork>(out, source, adapter, model());
     } else {
         return false;
     }

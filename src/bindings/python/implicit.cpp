@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "formula_door.hpp"
+#include "formula_adapter.hpp"
 #include "forwarding.hpp"
 #include "implicit.hpp"
 #include "ricochet/rosenbrock.hpp"
@@ -28,14 +28,14 @@ namespace {
 }
 
 /// Forward differences along the flow, which exists ahead of the state.
-void jacobian_by_differences(RunDoor& of, Mode mode, double t, const State& x,
+void jacobian_by_differences(RunAdapter& of, Mode mode, double t, const State& x,
                              std::span<double> rows)
 {
     const std::size_t n = x.size();
     State here(n), there(n), moved = x;
     const auto flow = [&](const State& at, State& rate) {
         ++of.implicit().flow_calls;
-        of.table().flow(of.door(), mode, t, at, rate);
+        of.table().flow(of.adapter(), mode, t, at, rate);
     };
     flow(x, here);
     for (std::size_t j = 0; j < n; ++j) {
@@ -47,27 +47,27 @@ void jacobian_by_differences(RunDoor& of, Mode mode, double t, const State& x,
     }
 }
 
-/// The flow behind a door, with its Jacobian: the caller's, or differences.
+/// The flow behind a adapter, with its Jacobian: the caller's, or differences.
 class ImplicitSystem {
 public:
     static constexpr bool unchecked_names = true;
     using State = python::State;
 
-    explicit ImplicitSystem(RunDoor& callbacks)
-        : name(callbacks.table().name(callbacks.door())), callbacks_(&callbacks)
+    explicit ImplicitSystem(RunAdapter& callbacks)
+        : name(callbacks.table().name(callbacks.adapter())), callbacks_(&callbacks)
     {
     }
 
     std::string name;
 
-    [[nodiscard]] RunDoor& callbacks() const noexcept { return *callbacks_; }
+    [[nodiscard]] RunAdapter& callbacks() const noexcept { return *callbacks_; }
     [[nodiscard]] std::size_t mode_count() const
     {
-        return callbacks_->table().mode_count(callbacks_->door());
+        return callbacks_->table().mode_count(callbacks_->adapter());
     }
     void flow(Mode mode, double t, const State& x, State& dxdt) const
     {
-        callbacks_->table().flow(callbacks_->door(), mode, t, x, dxdt);
+        callbacks_->table().flow(callbacks_->adapter(), mode, t, x, dxdt);
     }
     void jacobian(Mode mode, double t, const State& x, std::span<double> rows) const
     {
@@ -77,15 +77,16 @@ public:
     }
 
 private:
-    RunDoor* callbacks_;
+    RunAdapter* callbacks_;
 };
 
-/// The kernel of the method, whose factorizations are counted at the door of the caller's system.
+/// The kernel of the method, whose factorizations are counted at the adapter of the caller's
+/// system.
 template <class System>
 class CountedKernel {
     using Step = detail::StepState<State>;
     using Kernel = detail::StepKernel<State>;
-    using Door = detail::StepperDoor<System, State, Rosenbrock4>;
+    using SystemAdapter = detail::StepperAdapter<System, State, Rosenbrock4>;
 
     static constexpr Kernel plain = detail::KernelOf<System, State, Rosenbrock4>::make();
 
@@ -93,8 +94,9 @@ class CountedKernel {
     /// has computed another Jacobian, or the factors are of another length of step.
     class Count {
     public:
-        explicit Count(void* door)
-            : of_(*static_cast<Door*>(static_cast<detail::Door<System, State>*>(door))),
+        explicit Count(void* adapter)
+            : of_(*static_cast<SystemAdapter*>(
+                  static_cast<detail::SystemAdapter<System, State>*>(adapter))),
               counts_(of_.system().callbacks().implicit()),
               length_(of_.room.factored),
               jacobians_(counts_.jacobians)
@@ -109,36 +111,36 @@ class CountedKernel {
         }
 
     private:
-        Door& of_;
+        SystemAdapter& of_;
         ImplicitCounts& counts_;
         double length_;
         std::uint64_t jacobians_;
     };
 
-    static bool take(void* door, Step& step, double h)
+    static bool take(void* adapter, Step& step, double h)
     {
-        const Count count(door);
-        return plain.take(door, step, h);
+        const Count count(adapter);
+        return plain.take(adapter, step, h);
     }
-    static double attempt(void* door, Step& step, double h, double rtol, double atol)
+    static double attempt(void* adapter, Step& step, double h, double rtol, double atol)
     {
-        const Count count(door);
-        return plain.attempt(door, step, h, rtol, atol);
+        const Count count(adapter);
+        return plain.attempt(adapter, step, h, rtol, atol);
     }
-    static void depart(void* door, Step& step, double s, State& w, State& rate)
+    static void depart(void* adapter, Step& step, double s, State& w, State& rate)
     {
-        const Count count(door);
-        plain.depart(door, step, s, w, rate);
+        const Count count(adapter);
+        plain.depart(adapter, step, s, w, rate);
     }
-    static bool sample(void* door, Step& step, double s, double rtol, double atol, State& w)
+    static bool sample(void* adapter, Step& step, double s, double rtol, double atol, State& w)
     {
-        const Count count(door);
-        return plain.sample(door, step, s, rtol, atol, w);
+        const Count count(adapter);
+        return plain.sample(adapter, step, s, rtol, atol, w);
     }
-    static double roughness(void* door, Step& step, double rtol, double atol)
+    static double roughness(void* adapter, Step& step, double rtol, double atol)
     {
-        const Count count(door);
-        return plain.roughness(door, step, rtol, atol);
+        const Count count(adapter);
+        return plain.roughness(adapter, step, rtol, atol);
     }
 
     [[nodiscard]] static constexpr Kernel make()
@@ -160,11 +162,11 @@ public:
     }
 };
 
-/// The door of a run by this method to functions of Python, or to a ready system.
-class ImplicitDoor final : public RunDoor {
+/// The adapter of a run by this method to functions of Python, or to a ready system.
+class ImplicitAdapter final : public RunAdapter {
 public:
-    ImplicitDoor(std::unique_ptr<RunDoor> callbacks, const State& x0)
-        : callbacks_(std::move(callbacks)), system_(*callbacks_), door_(system_, x0)
+    ImplicitAdapter(std::unique_ptr<RunAdapter> callbacks, const State& x0)
+        : callbacks_(std::move(callbacks)), system_(*callbacks_), adapter_(system_, x0)
     {
         Forwarding<ImplicitSystem>::all(table_, callbacks_->table());
     }
@@ -173,12 +175,12 @@ public:
     {
         return table_;
     }
-    [[nodiscard]] void* door() noexcept override
+    [[nodiscard]] void* adapter() noexcept override
     {
-        return static_cast<detail::Door<ImplicitSystem, State>*>(&door_);
+        return static_cast<detail::SystemAdapter<ImplicitSystem, State>*>(&adapter_);
     }
     [[nodiscard]] bool is_free() const noexcept override { return callbacks_->is_free(); }
-    void choose_method(detail::RunSetup<State>& setup) override
+    void choose_method(detail::RunBindings<State>& setup) override
     {
         setup.kernel = &CountedKernel<ImplicitSystem>::counted();
     }
@@ -190,32 +192,32 @@ public:
     [[nodiscard]] ImplicitCounts& implicit() noexcept override { return callbacks_->implicit(); }
 
 private:
-    std::unique_ptr<RunDoor> callbacks_;
+    std::unique_ptr<RunAdapter> callbacks_;
     detail::SystemTable<State> table_;
     ImplicitSystem system_;
-    detail::StepperDoor<ImplicitSystem, State, Rosenbrock4> door_;
+    detail::StepperAdapter<ImplicitSystem, State, Rosenbrock4> adapter_;
 };
 
 }  // namespace
 
 template <>
-void FormulaDoor<Rosenbrock4>::choose_method(detail::RunSetup<State>& setup)
+void FormulaAdapter<Rosenbrock4>::choose_method(detail::RunBindings<State>& setup)
 {
     setup.kernel = &CountedKernel<FormulaSystem>::counted();
 }
 
-std::unique_ptr<RunDoor> implicit_door(std::unique_ptr<RunDoor> callbacks, const State& x0)
+std::unique_ptr<RunAdapter> implicit_adapter(std::unique_ptr<RunAdapter> callbacks, const State& x0)
 {
-    return std::make_unique<ImplicitDoor>(std::move(callbacks), x0);
+    return std::make_unique<ImplicitAdapter>(std::move(callbacks), x0);
 }
 
-std::unique_ptr<RunDoor> implicit_formula_door(std::unique_ptr<RunDoor> callbacks,
-                                               const ModedFormula& flow,
-                                               std::vector<const ModedFormula*> guards,
-                                               const State& x0)
+std::unique_ptr<RunAdapter> implicit_formula_adapter(std::unique_ptr<RunAdapter> callbacks,
+                                                     const ModedFormula& flow,
+                                                     std::vector<const ModedFormula*> guards,
+                                                     const State& x0)
 {
-    return std::make_unique<FormulaDoor<Rosenbrock4>>(std::move(callbacks), flow, std::move(guards),
-                                                      x0);
+    return std::make_unique<FormulaAdapter<Rosenbrock4>>(std::move(callbacks), flow,
+                                                         std::move(guards), x0);
 }
 
 }  // namespace ricochet::python

@@ -1,4 +1,4 @@
-// Doors of runs by Rosenbrock's method.
+// SystemAdapters of runs by Rosenbrock's method.
 #pragma once
 
 #include <memory>
@@ -9,14 +9,14 @@
 
 namespace ricochet::python {
 
-/// A door for any system: its Jacobian is the caller's, else made of differences.
-[[nodiscard]] std::unique_ptr<RunDoor> implicit_door(std::unique_ptr<RunDoor> callbacks,
-                                                     const State& x0);
+/// A adapter for any system: its Jacobian is the caller's, else made of differences.
+[[nodiscard]] std::unique_ptr<RunAdapter> implicit_adapter(std::unique_ptr<RunAdapter> callbacks,
+                                                           const State& x0);
 
-/// A door for formulas, of which the Jacobian is exact.
-/// @param callbacks  a door to the same system, for its resets and further functions
-[[nodiscard]] std::unique_ptr<RunDoor> implicit_formula_door(
-    std::unique_ptr<RunDoor> callbacks, const ModedFormula& flow,
+/// A adapter for formulas, of which the Jacobian is exact.
+/// @param callbacks  a adapter to the same system, for its resets and further functions
+[[nodiscard]] std::unique_ptr<RunAdapter> implicit_formula_adapter(
+    std::unique_ptr<RunAdapter> callbacks, const ModedFormula& flow,
     std::vector<const ModedFormula*> guards, const State& x0);
 
 }  // namespace ricochet::python

@@ -17,9 +17,9 @@
 #include <utility>
 #include <vector>
 
+#include "adapted_system.hpp"
 #include "arrays.hpp"
 #include "background.hpp"
-#include "door_system.hpp"
 #include "ricochet/learn/certify.hpp"
 #include "ricochet/learn/train.hpp"
 #include "ricochet/nn/model.hpp"
@@ -238,7 +238,7 @@ py::object train_classifier(const std::shared_ptr<Source>& source, const Rows& s
 {
     ClassifierTraining training;
     read(training, given, classifier_options());
-    const DoorSystem system(*source, states.at(0));
+    const AdaptedSystem system(*source, states.at(0));
     if (system.guard_count() != 1) {
         throw py::value_error("train_classifier: found a system of " +
                               std::to_string(system.guard_count()) +
@@ -290,7 +290,7 @@ py::object train_gate(const std::shared_ptr<Source>& source, const Rows& states,
 {
     GateTraining training;
     read(training, given, gate_options());
-    const DoorSystem system(*source, states.at(0));
+    const AdaptedSystem system(*source, states.at(0));
     if (system.guard_count() == 0) {
         throw py::value_error("train_gate: found a system without guards, expected at least one");
     }
@@ -344,30 +344,30 @@ py::object train_gate(const std::shared_ptr<Source>& source, const Rows& states,
 
 // --- certification ---
 
-/// Doors to one system, one for each concurrent call, since the threads of a proof share the
-/// system.
-class Doors {
+/// SystemAdapters to one system, one for each concurrent call, since the threads of a proof share
+/// the system.
+class SystemAdapters {
 public:
-    Doors(const Source& source, const State& like) : source_(&source), like_(like) {}
+    SystemAdapters(const Source& source, const State& like) : source_(&source), like_(like) {}
 
     template <class Use>
     auto with(const Use& use)
     {
-        std::unique_ptr<DoorSystem> door;
+        std::unique_ptr<AdaptedSystem> adapter;
         {
             const std::scoped_lock lock(mutex_);
             if (!free_.empty()) {
-                door = std::move(free_.back());
+                adapter = std::move(free_.back());
                 free_.pop_back();
             }
         }
-        if (!door) {
+        if (!adapter) {
             const Interpreter held(true);
-            door = std::make_unique<DoorSystem>(*source_, like_);
+            adapter = std::make_unique<AdaptedSystem>(*source_, like_);
         }
-        const auto result = use(*door);
+        const auto result = use(*adapter);
         const std::scoped_lock lock(mutex_);
-        free_.push_back(std::move(door));
+        free_.push_back(std::move(adapter));
         return result;
     }
 
@@ -375,7 +375,7 @@ private:
     const Source* source_;
     State like_;
     std::mutex mutex_;
-    std::vector<std::unique_ptr<DoorSystem>> free_;
+    std::vector<std::unique_ptr<AdaptedSystem>> free_;
 };
 
 /// Value of a bound that is a Python function of one or two arrays.
@@ -404,7 +404,7 @@ private:
 }
 
 /// @throws std::invalid_argument or value_error for a model of another system
-void check_certifiable(const Model& model, const DoorSystem& system)
+void check_certifiable(const Model& model, const AdaptedSystem& system)
 {
     if (system.guard_count() == 0) {
         throw py::value_error("certify: found a system without guards, expected at least one");
@@ -481,8 +481,8 @@ py::object certify(const py::bytes& content, const std::shared_ptr<Source>& sour
     const Model model =
         parse_model(std::as_bytes(std::span(text.data(), text.size())), "the network");
     const std::size_t n = model.domain.size();
-    Doors doors(*source, State(n));
-    doors.with([&](const DoorSystem& system) {
+    SystemAdapters adapters(*source, State(n));
+    adapters.with([&](const AdaptedSystem& system) {
         check_certifiable(model, system);
         return 0;
     });
@@ -495,8 +495,9 @@ py::object certify(const py::bytes& content, const std::shared_ptr<Source>& sour
     learn::GuardProblem problem;
     problem.guard = [&](const double* x) {
         return unless_stopped([&] {
-            return doors.with(
-                [&](const DoorSystem& system) { return system.guard(0, 0, 0.0, State(x, x + n)); });
+            return adapters.with([&](const AdaptedSystem& system) {
+                return system.guard(0, 0, 0.0, State(x, x + n));
+            });
         });
     };
     if (PyCallable_Check(slack.ptr())) {

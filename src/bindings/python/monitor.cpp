@@ -109,17 +109,17 @@ public:
         request.options.t_end = sign_ * std::numeric_limits<double>::infinity();
         start_mode_ = source_->start_mode();
         components_ = like.size();
-        door_ = source_->open(like);
-        if (door_->has_inclusion()) {
+        adapter_ = source_->open(like);
+        if (adapter_->has_inclusion()) {
             throw std::invalid_argument(
                 "Monitor: found a system with set_valued, which a monitor cannot follow, expected "
                 "integrate or Simulation");
         }
         // Guards see whole states: a host's interpolant need be no polynomial.
-        table_ = door_->table();
+        table_ = adapter_->table();
         table_.guard_on = nullptr;
         table_.rate_on = nullptr;
-        setup_ = setup_for(request, *source_, *door_);
+        setup_ = setup_for(request, *source_, *adapter_);
         setup_.setup.system = &table_;
         // There is no method of our own: the host has its own.
         setup_.setup.stepping = "";
@@ -302,7 +302,7 @@ private:
             const Verdict verdict = work();
             ended_ = verdict == Verdict::ended;
             has_cut_ = has_cut_ || verdict == Verdict::cut;
-            if (const auto raised = door_->watch().take_raised()) raise_with(*raised, record());
+            if (const auto raised = adapter_->watch().take_raised()) raise_with(*raised, record());
             return verdict;
         } catch (const PythonError& error) {
             raise_with(error, record());
@@ -363,7 +363,7 @@ private:
     PyRun names_;
     Mode start_mode_ = 0;
     std::size_t components_ = 0;  ///< number of components of `like`
-    std::unique_ptr<RunDoor> door_;
+    std::unique_ptr<RunAdapter> adapter_;
     detail::SystemTable<State> table_;
     OwnedSetup setup_;
     detail::Owner<detail::AnyMonitor<State>> monitor_;

@@ -51,17 +51,17 @@ private:
 
 /// @tparam Method  of the steps
 template <class System, class Method>
-class ReadyDoor final : public RunDoor {
+class ReadyAdapter final : public RunAdapter {
 public:
-    ReadyDoor(const System& system, std::string_view name)
-        : system_(system, name, watch()), door_(system_, State{})
+    ReadyAdapter(const System& system, std::string_view name)
+        : system_(system, name, watch()), adapter_(system_, State{})
     {
     }
 
-    void choose_method(detail::RunSetup<State>& setup) override
+    void choose_method(detail::RunBindings<State>& setup) override
     {
         if constexpr (std::is_same_v<Method, MethodByName>) {
-            RunDoor::choose_method(setup);
+            RunAdapter::choose_method(setup);
         } else {
             detail::step_by_series<Watched<System>, State, Method::components>(setup);
         }
@@ -71,15 +71,15 @@ public:
     {
         return detail::system_table<Watched<System>, State>;
     }
-    [[nodiscard]] void* door() noexcept override
+    [[nodiscard]] void* adapter() noexcept override
     {
-        return static_cast<detail::Door<Watched<System>, State>*>(&door_);
+        return static_cast<detail::SystemAdapter<Watched<System>, State>*>(&adapter_);
     }
     [[nodiscard]] bool is_free() const noexcept override { return true; }
 
 private:
     Watched<System> system_;
-    detail::StepperDoor<Watched<System>, State, Method> door_;
+    detail::StepperAdapter<Watched<System>, State, Method> adapter_;
 };
 
 /// A whole run by the loop for `System`.
@@ -91,7 +91,7 @@ Record run_by(const Method& method, const Watched<System>& system, const State& 
     using Stepping = ErrorControlled<Method>;
     X start;
     std::copy_n(x0.begin(), start.size(), start.begin());
-    detail::PartsOfRun<Watched<System>, X, Stepping, Extremum, Newton> parts(
+    detail::RunComponents<Watched<System>, X, Stepping, Extremum, Newton> parts(
         system, start, Stepping{method}, Extremum{}, Newton{});
     auto setup = parts.setup();
     setup.cancels_by_itself = true;
@@ -107,23 +107,23 @@ class ReadySource final : public Source {
 public:
     explicit ReadySource(const System& system) : system_(system) {}
 
-    [[nodiscard]] std::unique_ptr<RunDoor> open(const State& x0) const override
+    [[nodiscard]] std::unique_ptr<RunAdapter> open(const State& x0) const override
     {
         require_size(x0);
-        return std::make_unique<ReadyDoor<Driven, MethodByName>>(system_, System::name);
+        return std::make_unique<ReadyAdapter<Driven, MethodByName>>(system_, System::name);
     }
 
-    [[nodiscard]] std::unique_ptr<RunDoor> open_by_series(const State& x0) const override
+    [[nodiscard]] std::unique_ptr<RunAdapter> open_by_series(const State& x0) const override
     {
         require_size(x0);
         constexpr std::size_t components = detail::fixed_size<X>();
-        return std::make_unique<ReadyDoor<Driven, detail::TaylorOf<components>>>(system_,
-                                                                                 System::name);
+        return std::make_unique<ReadyAdapter<Driven, detail::TaylorOf<components>>>(system_,
+                                                                                    System::name);
     }
 
-    [[nodiscard]] std::unique_ptr<RunDoor> open_implicit(const State& x0) const override
+    [[nodiscard]] std::unique_ptr<RunAdapter> open_implicit(const State& x0) const override
     {
-        return implicit_door(open(x0), x0);
+        return implicit_adapter(open(x0), x0);
     }
 
     [[nodiscard]] std::optional<Record> run_whole(const State& x0, const Request& request,

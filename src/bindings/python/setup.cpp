@@ -28,7 +28,7 @@ struct SomeSystem {
 };
 
 template <class Detector>
-void detect_by(detail::RunSetup<State>& setup)
+void detect_by(detail::RunBindings<State>& setup)
 {
     static const Detector detector{};
     setup.detector = detail::DetectorTableOf<Detector, SomeSystem, State>::make(detector);
@@ -36,7 +36,7 @@ void detect_by(detail::RunSetup<State>& setup)
 }
 
 template <class Locator>
-void locate_by(detail::RunSetup<State>& setup)
+void locate_by(detail::RunBindings<State>& setup)
 {
     static const Locator locator{};
     setup.locator = detail::locator_table<Locator>();
@@ -49,7 +49,7 @@ void locate_by(detail::RunSetup<State>& setup)
                                 "', expected " + expected);
 }
 
-void detect_without_gate(detail::RunSetup<State>& setup, const Request& request)
+void detect_without_gate(detail::RunBindings<State>& setup, const Request& request)
 {
     const std::string_view detector = request.detector;
     if (request.gate) {
@@ -71,15 +71,16 @@ void detect_without_gate(detail::RunSetup<State>& setup, const Request& request)
 
 }  // namespace
 
-std::unique_ptr<RunDoor> open_for(const Request& request, const Source& source, const State& x0)
+std::unique_ptr<RunAdapter> open_for(const Request& request, const Source& source, const State& x0)
 {
     if (request.implicit) return source.open_implicit(x0);
     return request.by_series ? source.open_by_series(x0) : source.open(x0);
 }
 
-RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunDoor& door, const State& x0)
+RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunAdapter& adapter,
+                 const State& x0)
 {
-    if (!door.has_inclusion()) {
+    if (!adapter.has_inclusion()) {
         own_ = detail::make_loop(setup.setup, x0, request.options);
         loop_ = own_.operator->();
         return;
@@ -98,7 +99,7 @@ RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunDoor& door,
     detail::PhasedSetup<State> phases;
     phases.user = setup.setup;
     phases.method = request.method;
-    door.add_inclusions(phases, x0.size(), request.options);
+    adapter.add_inclusions(phases, x0.size(), request.options);
     phased_ = detail::make_phased_run(std::move(phases), x0, request.options);
     loop_ = &phased_->loop();
 #else
@@ -108,21 +109,21 @@ RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunDoor& door,
 #endif
 }
 
-OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door)
+OwnedSetup setup_for(const Request& request, const Source& source, RunAdapter& adapter)
 {
     OwnedSetup out;
-    detail::RunSetup<State>& setup = out.setup;
-    setup.system = &door.table();
-    setup.door = door.door();
+    detail::RunBindings<State>& setup = out.setup;
+    setup.system = &adapter.table();
+    setup.adapter = adapter.adapter();
     setup.error_controlled = !request.fixed;
     setup.cancels_by_itself = true;
-    if (!detect_by_gate(out, request, source, door)) detect_without_gate(setup, request);
+    if (!detect_by_gate(out, request, source, adapter)) detect_without_gate(setup, request);
     if (request.by_series) {
-        door.choose_method(setup);
+        adapter.choose_method(setup);
         setup.stepping = request.fixed ? detail::written_type<FixedStep<Taylor>>()
                                        : detail::written_type<ErrorControlled<Taylor>>();
     } else if (request.implicit) {
-        door.choose_method(setup);
+        adapter.choose_method(setup);
         setup.stepping = request.fixed ? detail::written_type<FixedStep<Rosenbrock4>>()
                                        : detail::written_type<ErrorControlled<Rosenbrock4>>();
     } else {

@@ -12,19 +12,20 @@ namespace ricochet::python {
 
 /// A setup together with its detector, where the setup has one of its own.
 struct OwnedSetup {
-    detail::RunSetup<State> setup;
+    detail::RunBindings<State> setup;
     std::shared_ptr<const void> detector;
 };
 
-/// Opens the door of a run.
+/// Opens the adapter of a run.
 /// @throws std::invalid_argument for a start, or a method, that the source cannot serve.
-[[nodiscard]] std::unique_ptr<RunDoor> open_for(const Request& request, const Source& source,
-                                                const State& x0);
+[[nodiscard]] std::unique_ptr<RunAdapter> open_for(const Request& request, const Source& source,
+                                                   const State& x0);
 
-/// The setup of a run of `source` at `door`, which must outlive it.
+/// The setup of a run of `source` at `adapter`, which must outlive it.
 /// @throws std::invalid_argument for an unknown detector or locator, or a gate of a kind that the
 /// detector cannot use.
-[[nodiscard]] OwnedSetup setup_for(const Request& request, const Source& source, RunDoor& door);
+[[nodiscard]] OwnedSetup setup_for(const Request& request, const Source& source,
+                                   RunAdapter& adapter);
 
 /// The loop of a run, which has phases if its system has set-valued motion.
 class RunLoop {
@@ -32,7 +33,7 @@ public:
     RunLoop() = default;
     /// @throws std::invalid_argument as `make_loop`, and for options that no run with set-valued
     /// motion has
-    RunLoop(const Request& request, const OwnedSetup& setup, RunDoor& door, const State& x0);
+    RunLoop(const Request& request, const OwnedSetup& setup, RunAdapter& adapter, const State& x0);
 
     [[nodiscard]] explicit operator bool() const noexcept { return loop_ != nullptr; }
     [[nodiscard]] detail::AnyLoop<State>& operator*() const noexcept { return *loop_; }
@@ -46,6 +47,6 @@ private:
 
 /// The same for the detectors that ask a gate. False: the request names another one.
 [[nodiscard]] bool detect_by_gate(OwnedSetup& out, const Request& request, const Source& source,
-                                  RunDoor& door);
+                                  RunAdapter& adapter);
 
 }  // namespace ricochet::python

@@ -113,9 +113,9 @@ void work_freely(bool freely, const Work& work)
 }
 
 /// Adds what an implicit method has done.
-[[nodiscard]] Record with_counts(Record record, RunDoor& door)
+[[nodiscard]] Record with_counts(Record record, RunAdapter& adapter)
 {
-    const ImplicitCounts& counts = door.implicit();
+    const ImplicitCounts& counts = adapter.implicit();
     record.jacobians = counts.jacobians;
     record.factorizations = counts.factorizations;
     record.statistics.flow_calls += counts.flow_calls;
@@ -140,22 +140,22 @@ PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& r
         return out;
     }
 
-    const std::unique_ptr<RunDoor> door = open_for(request, *source, x0);
-    request.options.cancelled = door->watch().cancelled();
-    const OwnedSetup owned = setup_for(request, *source, *door);
+    const std::unique_ptr<RunAdapter> adapter = open_for(request, *source, x0);
+    request.options.cancelled = adapter->watch().cancelled();
+    const OwnedSetup owned = setup_for(request, *source, *adapter);
     StepEnds<State> steps;
     StepEnds<State>* const kept = request.record_steps ? &steps : nullptr;
     RunLoop loop;
     try {
-        loop = RunLoop(request, owned, *door, x0);
-        work_freely(door->is_free(), [&] { drive(*loop, kept); });
+        loop = RunLoop(request, owned, *adapter, x0);
+        work_freely(adapter->is_free(), [&] { drive(*loop, kept); });
     } catch (const PythonError& error) {
-        out.record = loop ? with_counts(record_of(loop->finish(), kept), *door)
+        out.record = loop ? with_counts(record_of(loop->finish(), kept), *adapter)
                           : start_of(x0, request.options);
         raise_with(error, std::move(out));
     }
-    out.record = with_counts(record_of(loop->finish(), kept), *door);
-    if (door->watch().raised()) raise_with(*door->watch().raised(), std::move(out));
+    out.record = with_counts(record_of(loop->finish(), kept), *adapter);
+    if (adapter->watch().raised()) raise_with(*adapter->watch().raised(), std::move(out));
     return out;
 }
 
@@ -230,11 +230,11 @@ public:
         Request request = request_from(given);
         if (!given.contains("mode")) request.options.mode = source_->start_mode();
         record_steps_ = request.record_steps;
-        door_ = open_for(request, *source_, x0);
-        request.options.cancelled = door_->watch().cancelled();
-        setup_ = setup_for(request, *source_, *door_);
+        adapter_ = open_for(request, *source_, x0);
+        request.options.cancelled = adapter_->watch().cancelled();
+        setup_ = setup_for(request, *source_, *adapter_);
         try {
-            loop_ = RunLoop(request, setup_, *door_, x0);
+            loop_ = RunLoop(request, setup_, *adapter_, x0);
         } catch (const PythonError& error) {
             PyRun run = names_;
             run.record = start_of(x0, request.options);
@@ -349,11 +349,11 @@ private:
         if (finished_) return false;
         bool goes_on = false;
         try {
-            work_freely(door_->is_free(), [&] { goes_on = work(); });
+            work_freely(adapter_->is_free(), [&] { goes_on = work(); });
         } catch (const PythonError& error) {
             end_with(error);
         }
-        if (const auto& raised = door_->watch().raised()) end_with(*raised);
+        if (const auto& raised = adapter_->watch().raised()) end_with(*raised);
         return goes_on;
     }
 
@@ -366,7 +366,7 @@ private:
             throw std::runtime_error("Simulation: found finished, expected going on");
         }
         try {
-            work_freely(door_->is_free(), work);
+            work_freely(adapter_->is_free(), work);
         } catch (const PythonError& error) {
             PyRun run = names_;
             run.record = record_of(Run<State>(loop_->run()));
@@ -378,9 +378,9 @@ private:
 
     [[nodiscard]] Record recorded(Run<State> run)
     {
-        if (!record_steps_) return with_counts(record_of(std::move(run)), *door_);
+        if (!record_steps_) return with_counts(record_of(std::move(run)), *adapter_);
         const StepEnds<State> steps = step_ends_of(run);
-        return with_counts(record_of(std::move(run), &steps), *door_);
+        return with_counts(record_of(std::move(run), &steps), *adapter_);
     }
 
     [[noreturn]] void end_with(const PythonError& error)
@@ -392,7 +392,7 @@ private:
 
     std::shared_ptr<Source> source_;
     PyRun names_;
-    std::unique_ptr<RunDoor> door_;
+    std::unique_ptr<RunAdapter> adapter_;
     OwnedSetup setup_;
     RunLoop loop_;
     std::optional<PyRun> finished_;

@@ -1,4 +1,4 @@
-// A system of any kind, and the doors of its runs.
+// A system of any kind, and the adapters of its runs.
 #pragma once
 
 #include "python_error.hpp"
@@ -65,24 +65,24 @@ struct ImplicitCounts {
     std::uint64_t flow_calls = 0;  ///< for differences, which the loop does not count
 };
 
-/// The door of one run to its system.
-class RunDoor {
+/// The adapter of one run to its system.
+class RunAdapter {
 public:
-    RunDoor() = default;
-    RunDoor(const RunDoor&) = delete;
-    RunDoor& operator=(const RunDoor&) = delete;
-    virtual ~RunDoor() = default;
+    RunAdapter() = default;
+    RunAdapter(const RunAdapter&) = delete;
+    RunAdapter& operator=(const RunAdapter&) = delete;
+    virtual ~RunAdapter() = default;
 
     [[nodiscard]] virtual const detail::SystemTable<State>& table() const noexcept = 0;
-    [[nodiscard]] virtual void* door() noexcept = 0;
+    [[nodiscard]] virtual void* adapter() noexcept = 0;
     /// Whether none of the system's functions needs the interpreter.
     [[nodiscard]] virtual bool is_free() const noexcept = 0;
 
-    /// Lets a run at this door, whose detector is known, take its steps by the method for which the
-    /// door was opened.
-    virtual void choose_method(detail::RunSetup<State>& /*setup*/)
+    /// Lets a run at this adapter, whose detector is known, take its steps by the method for which
+    /// the adapter was opened.
+    virtual void choose_method(detail::RunBindings<State>& /*setup*/)
     {
-        throw std::logic_error("a door that is not opened for a method of its own");
+        throw std::logic_error("a adapter that is not opened for a method of its own");
     }
 
     /// Writes the derivatives of the flow by the state, row by row; false where they are not known.
@@ -99,11 +99,11 @@ public:
     virtual void add_inclusions(detail::PhasedSetup<State>& /*setup*/, std::size_t /*n*/,
                                 const Options& /*options*/)
     {
-        throw std::logic_error("a door to a system without set-valued motion");
+        throw std::logic_error("a adapter to a system without set-valued motion");
     }
 
     [[nodiscard]] virtual SignalWatch& watch() noexcept { return *watch_; }
-    /// Lets signals be handled by the watch of another door, which must outlive this one.
+    /// Lets signals be handled by the watch of another adapter, which must outlive this one.
     void share_watch(SignalWatch& watch) noexcept { watch_ = &watch; }
 
 private:
@@ -119,13 +119,13 @@ public:
     Source& operator=(const Source&) = delete;
     virtual ~Source() = default;
 
-    /// Opens a door for a run; the source must outlive it.
+    /// Opens a adapter for a run; the source must outlive it.
     /// @throws std::invalid_argument for a start that the system does not support.
-    [[nodiscard]] virtual std::unique_ptr<RunDoor> open(const State& x0) const = 0;
+    [[nodiscard]] virtual std::unique_ptr<RunAdapter> open(const State& x0) const = 0;
 
     /// The same for steps by Taylor's method.
     /// @throws std::invalid_argument where the flow is no formula
-    [[nodiscard]] virtual std::unique_ptr<RunDoor> open_by_series(const State& /*x0*/) const
+    [[nodiscard]] virtual std::unique_ptr<RunAdapter> open_by_series(const State& /*x0*/) const
     {
         throw std::invalid_argument(
             "method: found 'taylor', which needs the flow as a formula, for functions of Python; "
@@ -134,7 +134,7 @@ public:
     }
 
     /// The same for steps by Rosenbrock's method.
-    [[nodiscard]] virtual std::unique_ptr<RunDoor> open_implicit(const State& /*x0*/) const
+    [[nodiscard]] virtual std::unique_ptr<RunAdapter> open_implicit(const State& /*x0*/) const
     {
         throw std::invalid_argument("method: found 'rosenbrock4' for a system without it");
     }

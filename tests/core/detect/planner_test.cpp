@@ -99,8 +99,8 @@ public:
                   bool backward = false)
         : clock_(std::move(system)),
           planned_(options),
-          door_(clock_, X{t}),
-          system_(detail::system_table<System, X>, &door_),
+          adapter_(clock_, X{t}),
+          system_(detail::system_table<System, X>, &adapter_),
           detector_(detail::DetectorTableOf<Planned<>, System, X>::make(planned_)),
           locator_(detail::locator_table<Newton>()),
           finders_{detector_, &planned_, locator_, &newton_},
@@ -147,7 +147,7 @@ private:
     System clock_;
     Planned<> planned_;
     Newton newton_;
-    detail::Door<System, X> door_;
+    detail::SystemAdapter<System, X> adapter_;
     detail::SystemAt<Core> system_;
     detail::DetectorTable<Core> detector_;
     detail::LocatorTable locator_;

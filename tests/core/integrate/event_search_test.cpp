@@ -81,8 +81,8 @@ class InStep {
 public:
     explicit InStep(std::vector<Clock::Guard> guards, const Options& options = {.t_end = 100})
         : clock_{std::move(guards)},
-          door_(clock_, X{}),
-          system_(detail::system_table<Clock, X>, &door_),
+          adapter_(clock_, X{}),
+          system_(detail::system_table<Clock, X>, &adapter_),
           detector_(detail::DetectorTableOf<Extremum, Clock, X>::make(extremum_)),
           locator_(detail::locator_table<Newton>()),
           finders_{detector_, &extremum_, locator_, &newton_},
@@ -130,7 +130,7 @@ public:
 
 private:
     Clock clock_;
-    detail::Door<Clock, X> door_;
+    detail::SystemAdapter<Clock, X> adapter_;
     detail::SystemAt<Core> system_;
     Extremum extremum_;
     Newton newton_;

@@ -19,7 +19,7 @@ struct OwnFehlberg78 : detail::Fehlberg78Tableau {};
 
 /// Oscillators one after the other, and a clock, whose rate depends on nothing: where its estimate
 /// is zero, `Fehlberg78` takes another.
-bool flow(void* /*door*/, Mode /*mode*/, double /*t*/, const State& x, State& dxdt)
+bool flow(void* /*adapter*/, Mode /*mode*/, double /*t*/, const State& x, State& dxdt)
 {
     for (std::size_t i = 0; i + 1 < x.size(); ++i) dxdt[i] = std::sin(x[i + 1]) - 0.1 * x[i];
     dxdt.back() = 1;

@@ -23,15 +23,15 @@ class Set {
 public:
     explicit Set(std::vector<Reset> resets) : resets_(std::move(resets))
     {
-        table_.reset = [](void* door, std::size_t which, Mode mode, double, State& x) {
-            return static_cast<Set*>(door)->resets_[which](mode, x);
+        table_.reset = [](void* adapter, std::size_t which, Mode mode, double, State& x) {
+            return static_cast<Set*>(adapter)->resets_[which](mode, x);
         };
     }
     Set& on_time(Reset reset)
     {
         timed_ = std::move(reset);
-        table_.time_reset = [](void* door, Mode mode, double, State& x) {
-            return static_cast<Set*>(door)->timed_(mode, x);
+        table_.time_reset = [](void* adapter, Mode mode, double, State& x) {
+            return static_cast<Set*>(adapter)->timed_(mode, x);
         };
         return *this;
     }

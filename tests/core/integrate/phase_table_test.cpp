@@ -43,11 +43,11 @@ public:
     Sawtooth(const Sawtooth&) = delete;
     Sawtooth& operator=(const Sawtooth&) = delete;
 
-    [[nodiscard]] RunSetup<C> setup()
+    [[nodiscard]] RunBindings<C> setup()
     {
-        RunSetup<C> out;
+        RunBindings<C> out;
         out.system = &table_;
-        out.door = this;
+        out.adapter = this;
         out.kernel = &up_;
         out.detector = DetectorTableOf<Extremum, Sawtooth, std::array<double, 1>>::make(extremum_);
         out.detecting = &extremum_;
@@ -59,8 +59,8 @@ public:
     /// Lets rising phases go on at a glance.
     void glance()
     {
-        phases_.goes_on = [](void* door, Mode mode, double, const C&, bool) {
-            at(door).looks += falls(mode);
+        phases_.goes_on = [](void* adapter, Mode mode, double, const C&, bool) {
+            at(adapter).looks += falls(mode);
             return !falls(mode);
         };
     }
@@ -70,7 +70,7 @@ public:
     int reviews = 0;  ///< calls of `review`
 
 private:
-    [[nodiscard]] static Sawtooth& at(void* door) { return *static_cast<Sawtooth*>(door); }
+    [[nodiscard]] static Sawtooth& at(void* adapter) { return *static_cast<Sawtooth*>(adapter); }
     [[nodiscard]] static bool falls(Mode mode) { return mode >= own_modes; }
 
     void make_table()
@@ -99,40 +99,40 @@ private:
             return dxdt[0];
         };
         table_.reset = [](void*, std::size_t, Mode mode, double, C&) { return mode; };
-        table_.next_time_event = [](void* door, double t) {
-            for (const double tick : at(door).ticks_) {
+        table_.next_time_event = [](void* adapter, double t) {
+            for (const double tick : at(adapter).ticks_) {
                 if (tick > t) return tick;
             }
             return std::numeric_limits<double>::infinity();
         };
-        table_.time_reset = [](void* door, Mode mode, double, C&) {
-            ++at(door).ticks;
+        table_.time_reset = [](void* adapter, Mode mode, double, C&) {
+            ++at(adapter).ticks;
             return mode;
         };
     }
 
     void make_phases()
     {
-        phases_.door = this;
+        phases_.adapter = this;
         phases_.own_guards = [](void*) { return std::size_t{1}; };
-        phases_.stepper = [](void* door, Mode mode) -> Stepper<C> {
-            Sawtooth& me = at(door);
-            return {falls(mode) ? &me.down_ : &me.up_, door, me.table_.flow};
+        phases_.stepper = [](void* adapter, Mode mode) -> Stepper<C> {
+            Sawtooth& me = at(adapter);
+            return {falls(mode) ? &me.down_ : &me.up_, adapter, me.table_.flow};
         };
         phases_.enter = [](void*, Mode mode, double, C&) { return mode; };
-        phases_.decide = [](void* door, const PhaseSet<C>& set, C&) -> Mode {
-            Sawtooth& me = at(door);
+        phases_.decide = [](void* adapter, const PhaseSet<C>& set, C&) -> Mode {
+            Sawtooth& me = at(adapter);
             me.changes_.clear();
             if (set.on_change) me.changes_.push_back({.reaction = 0, .kind = EventKind::mode});
             if (falls(set.before)) return set.on_change ? 0 : set.after;
             return set.fired.empty() ? set.after : own_modes;
         };
-        phases_.changes = [](void* door) {
-            return std::span<const ReactionChange>(at(door).changes_);
+        phases_.changes = [](void* adapter) {
+            return std::span<const ReactionChange>(at(adapter).changes_);
         };
         phases_.records = [](void*, std::size_t) { return true; };
-        phases_.review = [](void* door, const PhaseStep<C>&, C&) {
-            ++at(door).reviews;
+        phases_.review = [](void* adapter, const PhaseStep<C>&, C&) {
+            ++at(adapter).reviews;
             return PhaseVerdict{};
         };
         phases_.give_up = [](void*, const PhaseEnd<C>&, C&) { return PhaseVerdict{}; };

@@ -30,16 +30,16 @@ using ricochet::detail::SystemTable;
 template <class C>
 class Exchange {
 public:
-    /// @param door  the argument of the table's functions, of the system as it is now
+    /// @param adapter  the argument of the table's functions, of the system as it is now
     /// @param states  number of components
-    void bind(const SystemTable<C>& table, void* door, std::size_t states)
+    void bind(const SystemTable<C>& table, void* adapter, std::size_t states)
     {
         held_.resize(states);
         table_ = &table;
-        door_ = door;
-        guards_.resize(table.guard_count(door));
+        adapter_ = adapter;
+        guards_.resize(table.guard_count(adapter));
         infos_.clear();
-        for (std::size_t i = 0; i < guards_.size(); ++i) infos_.push_back(table.info(door, i));
+        for (std::size_t i = 0; i < guards_.size(); ++i) infos_.push_back(table.info(adapter, i));
     }
 
     void start(double t, const C& x, Mode mode)
@@ -47,13 +47,13 @@ public:
         for (Guard& guard : guards_) guard = {};
         (void)release();
         for (std::size_t i = 0; i < guards_.size(); ++i) arm(i, {t, x, mode}, false);
-        const bool due = table_->time_event_count && table_->time_event_count(door_, t) > 0;
+        const bool due = table_->time_event_count && table_->time_event_count(adapter_, t) > 0;
         next_time_ = due ? t : next_after(t, x, mode);
     }
 
     void rates(double t, const C& x, Mode mode, C& dxdt) const
     {
-        table_->flow(door_, mode, t, x, dxdt);
+        table_->flow(adapter_, mode, t, x, dxdt);
         for (std::size_t i = 0; i < held_.size(); ++i) {
             if (held_[i]) dxdt[i] = 0;
         }
@@ -88,7 +88,7 @@ public:
         }
         const Mode mode_before = mode;
         apply(fired, t, x, mode);
-        if (timed && table_->time_reset) mode = table_->time_reset(door_, mode, t, x);
+        if (timed && table_->time_reset) mode = table_->time_reset(adapter_, mode, t, x);
         count += fired.size() + (timed ? 1 : 0);
         if (resting_ != no_guard && (mode != mode_before || !still_rests(before, {t, x, mode}))) {
             arm(release(), {t, x, mode}, false);
@@ -149,7 +149,7 @@ private:
     }
     [[nodiscard]] double value(std::size_t i, const At& at) const
     {
-        return table_->guard(door_, i, at.mode, at.t, at.x);
+        return table_->guard(adapter_, i, at.mode, at.t, at.x);
     }
     [[nodiscard]] double rate(std::size_t i, const At& at) const
     {
@@ -159,7 +159,7 @@ private:
     }
     [[nodiscard]] double rate_along(std::size_t i, const At& at, const C& dxdt) const
     {
-        return table_->rate(door_, {i, at.mode}, {at.t, 1}, at.x, dxdt);
+        return table_->rate(adapter_, {i, at.mode}, {at.t, 1}, at.x, dxdt);
     }
 
     /// Second derivative of the resting guard along the free flow, by central differences whose
@@ -168,10 +168,10 @@ private:
     {
         const double length = 1e-5;
         C flow = at.x, there = at.x, flow_there = at.x;
-        table_->flow(door_, at.mode, at.t, at.x, flow);
+        table_->flow(adapter_, at.mode, at.t, at.x, flow);
         const auto along = [&](double s) {
             for (std::size_t i = 0; i < held_.size(); ++i) there[i] = at.x[i] + s * flow[i];
-            table_->flow(door_, at.mode, at.t + s, there, flow_there);
+            table_->flow(adapter_, at.mode, at.t + s, there, flow_there);
             return rate_along(resting_, {at.t + s, there, at.mode}, flow_there);
         };
         return (along(length) - along(-length)) / (2 * length);
@@ -184,7 +184,7 @@ private:
     }
     [[nodiscard]] bool is_enabled(std::size_t i, const At& at) const
     {
-        return !table_->enabled_in || table_->enabled_in(door_, i, at.mode);
+        return !table_->enabled_in || table_->enabled_in(adapter_, i, at.mode);
     }
 
     /// Guards that have left their sides; those that did in a direction that does not count are
@@ -205,7 +205,8 @@ private:
             const bool left = guard.above ? z < 0 : z > 0;
             if (!left) continue;
             const bool acts = infos_[i].resets && table_->resets();
-            const bool permitted = !table_->enabled_at || table_->enabled_at(door_, i, mode, t, x);
+            const bool permitted =
+                !table_->enabled_at || table_->enabled_at(adapter_, i, mode, t, x);
             if (acts && permitted && counts(i, guard.above)) {
                 fired.push_back(i);
             } else {
@@ -222,7 +223,7 @@ private:
     {
         if (fired.empty()) return;
         if (table_->reset_set) {
-            mode = table_->reset_set(door_, FiredGuards(fired), mode, t, x);
+            mode = table_->reset_set(adapter_, FiredGuards(fired), mode, t, x);
             return;
         }
         const C before = x;
@@ -250,9 +251,10 @@ private:
     Mode reset(std::size_t i, Mode mode, double t, C& x)
     {
         if (table_->tell_direction) {
-            table_->tell_direction(door_, guards_[i].above ? Crossing::falling : Crossing::rising);
+            table_->tell_direction(adapter_,
+                                   guards_[i].above ? Crossing::falling : Crossing::rising);
         }
-        return table_->reset(door_, i, mode, t, x);
+        return table_->reset(adapter_, i, mode, t, x);
     }
 
     /// Arms every guard after a set. True: one has been carried across, and fires next.
@@ -328,8 +330,8 @@ private:
         if (!accumulates && !stands) return;
         C other = x;
         for (std::size_t k = 0; k < held_.size(); ++k) other[k] += 1 + std::fabs(other[k]);
-        const Mode next = table_->rest(door_, i, mode, t, x);
-        (void)table_->rest(door_, i, mode, t, other);
+        const Mode next = table_->rest(adapter_, i, mode, t, x);
+        (void)table_->rest(adapter_, i, mode, t, other);
         guard.shrinking = 0;
         if (next != mode) {
             mode = next;
@@ -346,13 +348,13 @@ private:
 
     [[nodiscard]] double next_after(double t, const C& x, Mode mode) const
     {
-        if (table_->next_time_event_at) return table_->next_time_event_at(door_, mode, t, x);
-        if (table_->next_time_event) return table_->next_time_event(door_, t);
+        if (table_->next_time_event_at) return table_->next_time_event_at(adapter_, mode, t, x);
+        if (table_->next_time_event) return table_->next_time_event(adapter_, t);
         return std::numeric_limits<double>::infinity();
     }
 
     const SystemTable<C>* table_ = nullptr;
-    void* door_ = nullptr;
+    void* adapter_ = nullptr;
     std::vector<Guard> guards_;
     std::vector<GuardInfo> infos_;
     std::vector<std::uint8_t> held_;  ///< components that stand still

@@ -7,8 +7,8 @@
 #include <array>
 #include <cstddef>
 
-#include "ricochet/detail/door.hpp"
 #include "ricochet/detail/small_state.hpp"
+#include "ricochet/detail/system_adapter.hpp"
 #include "ricochet/methods.hpp"
 #include "ricochet/nonsmooth/detail/branch_terms.hpp"
 
@@ -35,7 +35,7 @@ struct FlowInMode {
 template <int N>
 inline constexpr bool has_branch_kernel = N >= 1 && N <= static_cast<int>(SmallState::room);
 
-/// Its functions take the `Door` of a `FlowInMode<N>`.
+/// Its functions take the `SystemAdapter` of a `FlowInMode<N>`.
 template <int N>
 [[nodiscard]] const StepKernel<SmallState>& branch_kernel(MethodName name) noexcept;
 extern template const StepKernel<SmallState>& branch_kernel<1>(MethodName name) noexcept;

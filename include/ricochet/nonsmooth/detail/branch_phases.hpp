@@ -26,10 +26,10 @@ namespace ricochet::detail {
 template <class X>
 struct StepKernel;
 
-/// A kernel and the door of its functions.
+/// A kernel and the adapter of its functions.
 struct BranchStepper {
     const StepKernel<SmallState>* kernel = nullptr;
-    void* door = nullptr;
+    void* adapter = nullptr;
 };
 
 struct BranchPhasesOptions {

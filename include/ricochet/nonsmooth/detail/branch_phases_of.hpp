@@ -176,7 +176,7 @@ public:
             if (size() != static_cast<std::size_t>(N)) return {};  // a state of another size
             flow_.of = modes_.flow_by_components();
             flow_.mode = b;
-            return {&branch_kernel<N>(method), &door_};
+            return {&branch_kernel<N>(method), &adapter_};
         }
         return {};
     }
@@ -453,7 +453,7 @@ private:
     Modes modes_;
     Known known_;
     FlowInMode<N> flow_;
-    Door<FlowInMode<N>, X> door_{flow_, X{}};
+    SystemAdapter<FlowInMode<N>, X> adapter_{flow_, X{}};
     HeldReactions<N, M> held_;
     HeldEnd held_end_;
     Located located_;

@@ -18,7 +18,7 @@ namespace ricochet::detail {
 /// What a run of a mechanism consists of, besides its start and its `Options`.
 template <class C>
 struct ContactSetup {
-    RunSetup<C> flight;
+    RunBindings<C> flight;
     Owner<ContactSteps> steps;
     ContactPhaseOptions phases{};
     FlightKinds kinds{0};

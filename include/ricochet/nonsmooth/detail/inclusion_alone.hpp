@@ -147,7 +147,7 @@ private:
     }
 
     Beside beside_;
-    PartsOfRun<Beside, X, Stepping, Extremum, Newton> parts_;
+    RunComponents<Beside, X, Stepping, Extremum, Newton> parts_;
     Owner<PhasedRun<C>> run_;
 };
 

@@ -41,16 +41,16 @@ struct EndInBranches {
 /// What a run with phases consists of, besides its start and its options.
 template <class C>
 struct PhasedSetup {
-    RunSetup<C> user;  ///< of the system without its inclusion
+    RunBindings<C> user;  ///< of the system without its inclusion
     /// One for each mode, or null; or one for all modes.
     std::vector<Owner<BranchPhases>> inclusions;
     bool by_mode = false;
     std::optional<AloneOptions> alone{};     ///< there is no flow but that of the inclusion
     MethodName method = MethodName::dopri5;  ///< of the explicit phases
     /// The mode in which a system continues by itself from (t, x); null if its mode stays.
-    Mode (*start_mode)(void* door, Mode mode, double t, const C& x) = nullptr;
+    Mode (*start_mode)(void* adapter, Mode mode, double t, const C& x) = nullptr;
     /// The reset of a stick, a slip or a mode; null if there is none.
-    Mode (*change)(void* door, std::size_t reaction, EventKind kind, Mode mode, double t,
+    Mode (*change)(void* adapter, std::size_t reaction, EventKind kind, Mode mode, double t,
                    C& x) = nullptr;
 };
 

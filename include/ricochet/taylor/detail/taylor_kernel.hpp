@@ -18,7 +18,7 @@
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/step_probe.hpp"
 #include "ricochet/taylor/detail/series_root.hpp"
-#include "ricochet/taylor/detail/taylor_door.hpp"
+#include "ricochet/taylor/detail/taylor_adapter.hpp"
 #include "ricochet/taylor/detail/taylor_step.hpp"
 
 namespace ricochet::detail {
@@ -28,7 +28,7 @@ template <class System, class X, std::size_t n>
 class TaylorKernel {
     using C = CoreState<X>;
     using State = StepState<C>;
-    using D = TaylorDoor<System, X, n>;
+    using D = TaylorAdapter<System, X, n>;
     using TStep = typename D::Step;
     using Room = typename D::Room;
     using Array = typename Room::Array;
@@ -45,15 +45,15 @@ class TaylorKernel {
     };
     using RoomFor = std::conditional_t<(n > 0), OwnRoom, BorrowedRoom>;
 
-    [[nodiscard]] static D& at(void* door) noexcept
+    [[nodiscard]] static D& at(void* adapter) noexcept
     {
-        return *static_cast<D*>(static_cast<Door<System, X>*>(door));
+        return *static_cast<D*>(static_cast<SystemAdapter<System, X>*>(adapter));
     }
 
     /// The coefficients of the step from the current start, unless they are known already.
-    [[gnu::always_inline]] static TStep& expand(void* door, const State& state, int order)
+    [[gnu::always_inline]] static TStep& expand(void* adapter, const State& state, int order)
     {
-        D& of = at(door);
+        D& of = at(adapter);
         TStep& step = of.step;
         const std::size_t size = step.size();
         bool same = size == state.x0.size() && step.asked >= order && step.order > 0 &&
@@ -107,15 +107,15 @@ class TaylorKernel {
         return reach.h;
     }
 
-    static double reach(void* door, State& state, double /*h*/, double rtol, double atol)
+    static double reach(void* adapter, State& state, double /*h*/, double rtol, double atol)
     {
-        const int order = taylor_order(at(door).given_order, rtol);
-        TStep& step = expand(door, state, order);
+        const int order = taylor_order(at(adapter).given_order, rtol);
+        TStep& step = expand(adapter, state, order);
         const double* const c = step.coefficients.data();
         const std::size_t size = step.size();
         ++state.flow_calls;
         for (std::size_t i = 0; i < size; ++i) state.rate0[i] = c[size + i];
-        step.reach = length_of(at(door), state, rtol, atol);
+        step.reach = length_of(at(adapter), state, rtol, atol);
         return step.reach;
     }
 
@@ -148,16 +148,16 @@ class TaylorKernel {
         return sum == 0;
     }
 
-    static double attempt(void* door, State& state, double h, double rtol, double atol)
+    static double attempt(void* adapter, State& state, double h, double rtol, double atol)
     {
-        const int order = taylor_order(at(door).given_order, rtol);
-        const TStep& step = expand(door, state, order);
+        const int order = taylor_order(at(adapter).given_order, rtol);
+        const TStep& step = expand(adapter, state, order);
         double longest = step.reach;
-        if (!(longest >= 0)) longest = reach(door, state, h, rtol, atol);
-        if (!go(at(door), state, h)) return std::numeric_limits<double>::quiet_NaN();
+        if (!(longest >= 0)) longest = reach(adapter, state, h, rtol, atol);
+        if (!go(at(adapter), state, h)) return std::numeric_limits<double>::quiet_NaN();
         // A step may be longer by millionths, to reach the end of a run.
         const double excess = h <= longest * (1 + 2e-6) ? 0 : std::pow(h / longest, step.order);
-        return step.doubtful ? excess + defect(at(door), state, rtol, atol) : excess;
+        return step.doubtful ? excess + defect(at(adapter), state, rtol, atol) : excess;
     }
 
     /// The largest difference between the flow at the end of the step and the rate of the series,
@@ -189,18 +189,18 @@ class TaylorKernel {
     /// that are omitted contribute less.
     static constexpr double most_defect = 100;
 
-    static bool take(void* door, State& state, double h)
+    static bool take(void* adapter, State& state, double h)
     {
-        const int order = at(door).step.asked;  // the order of the run, where it has started
-        const int given = at(door).given_order;
-        expand(door, state, given ? given : order ? order : most_taylor_order);
-        return go(at(door), state, h);
+        const int order = at(adapter).step.asked;  // the order of the run, where it has started
+        const int given = at(adapter).given_order;
+        expand(adapter, state, given ? given : order ? order : most_taylor_order);
+        return go(at(adapter), state, h);
     }
 
-    static void depart(void* door, State& state, double s, C& w, C& rate)
+    static void depart(void* adapter, State& state, double s, C& w, C& rate)
     {
-        const TStep& step = expand(door, state, at(door).step.asked);
-        RoomFor scratch(at(door));
+        const TStep& step = expand(adapter, state, at(adapter).step.asked);
+        RoomFor scratch(at(adapter));
         Room& room = scratch.room;
         evaluate_departure<true>(step.coefficients.data(), step.order, s, room.w, room.rate);
         const std::size_t size = step.size();
@@ -210,25 +210,25 @@ class TaylorKernel {
         }
     }
 
-    static void departure(void* door, const State& state, double s, C& w)
+    static void departure(void* adapter, const State& state, double s, C& w)
     {
-        const TStep& step = expand(door, state, at(door).step.asked);
-        RoomFor scratch(at(door));
+        const TStep& step = expand(adapter, state, at(adapter).step.asked);
+        RoomFor scratch(at(adapter));
         Room& room = scratch.room;
         evaluate_departure<false>(step.coefficients.data(), step.order, s, room.w, room.rate);
         const std::size_t size = step.size();
         for (std::size_t i = 0; i < size; ++i) w[i] = room.w[i];
     }
 
-    static SeriesTerms series(void* door, const State& state)
+    static SeriesTerms series(void* adapter, const State& state)
     {
-        const TStep& step = expand(door, state, at(door).step.asked);
+        const TStep& step = expand(adapter, state, at(adapter).step.asked);
         return {step.coefficients.data(), step.order, step.size()};
     }
 
-    static SeriesTerms guard_series(void* door, const State& state)
+    static SeriesTerms guard_series(void* adapter, const State& state)
     {
-        const TStep& step = expand(door, state, at(door).step.asked);
+        const TStep& step = expand(adapter, state, at(adapter).step.asked);
         return {step.guards.data(), step.order, step.guard_count()};
     }
 
@@ -237,9 +237,9 @@ class TaylorKernel {
     using Guard = GuardView<System, Y>;
 
     /// As `StepKernel::cross`.
-    static bool cross(void* door, State& state, SeriesCrossing& crossing)
+    static bool cross(void* adapter, State& state, SeriesCrossing& crossing)
     {
-        const TStep& step = expand(door, state, at(door).step.asked);
+        const TStep& step = expand(adapter, state, at(adapter).step.asked);
         const double sign = crossing.side == Side::above ? 1 : -1;
         SeriesRoot root;
         const GuardSeries on_series{.terms = {step.guards.data(), step.order, step.guard_count()},
@@ -248,11 +248,11 @@ class TaylorKernel {
                                     .sign = sign,
                                     .from_surface = crossing.from_surface};
         if (!find_first_root(on_series, sign * crossing.end, root)) return false;
-        const Guard guard(at(door).system(), crossing.calls,
+        const Guard guard(at(adapter).system(), crossing.calls,
                           {crossing.which, state.mode, state.backward});
         const double* const c = step.coefficients.data();
         const std::size_t size = step.size();
-        RoomFor scratch(at(door));
+        RoomFor scratch(at(adapter));
         Room& room = scratch.room;
         Array& w = room.w;
         Array& rate = room.rate;
@@ -397,22 +397,22 @@ class TaylorKernel {
     }
 
     template <bool controlled>
-    static void take_quiet_steps(void* door, State& state, QuietRun& run)
+    static void take_quiet_steps(void* adapter, State& state, QuietRun& run)
     {
-        const int given = at(door).given_order;
-        const int order = controlled                ? taylor_order(given, run.rtol)
-                          : given                   ? given
-                          : at(door).step.asked > 0 ? at(door).step.asked
-                                                    : most_taylor_order;
+        const int given = at(adapter).given_order;
+        const int order = controlled                   ? taylor_order(given, run.rtol)
+                          : given                      ? given
+                          : at(adapter).step.asked > 0 ? at(adapter).step.asked
+                                                       : most_taylor_order;
         run.why = QuietEnd::due;
         run.repeated = false;
         for (;;) {
             if (run.steps == run.most_steps) return;
             if (run.cancelled && run.cancelled->load(std::memory_order_relaxed)) return;
-            TStep& step = expand(door, state, order);
+            TStep& step = expand(adapter, state, order);
             double h = run.h_next;
             if constexpr (controlled) {
-                step.reach = length_of(at(door), state, run.rtol, run.atol);
+                step.reach = length_of(at(adapter), state, run.rtol, run.atol);
                 if (step.doubtful) return;  // the loop takes the step
                 // The loop refuses a step that is still too long.
                 if (!(step.reach >= smallest_step(run.h_min, state.start.value))) return;
@@ -421,14 +421,14 @@ class TaylorKernel {
             const double until = state.start.until(run.end);
             if (h * (1 + 1e-6) >= (state.backward ? -until : until)) return;
             if constexpr (controlled) ++state.flow_calls;
-            if (!go(at(door), state, h)) {
+            if (!go(at(adapter), state, h)) {
                 run.why = QuietEnd::failed;
                 run.error = std::numeric_limits<double>::quiet_NaN();
                 run.h_next = h;
                 return;
             }
             const double next = controlled ? std::min(10 * h, run.h_max) : h;
-            if (!passes(at(door), state, run)) {
+            if (!passes(at(adapter), state, run)) {
                 run.why = QuietEnd::doubt;
                 run.h_next = next;
                 return;
@@ -456,12 +456,12 @@ class TaylorKernel {
     }
 
     template <bool controlled>
-    static void run_quietly(void* door, State& state, QuietRun& run)
+    static void run_quietly(void* adapter, State& state, QuietRun& run)
     {
         const Instant start = state.start;
         const C x0 = state.x0, remainder = state.remainder, rate0 = state.rate0;
         try {
-            take_quiet_steps<controlled>(door, state, run);
+            take_quiet_steps<controlled>(adapter, state, run);
         } catch (...) {
             state.start = start;
             state.x0 = x0;

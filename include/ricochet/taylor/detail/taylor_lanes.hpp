@@ -18,7 +18,7 @@
 #include "ricochet/detail/quiet_run.hpp"
 #include "ricochet/detail/step_state.hpp"
 #include "ricochet/taylor/detail/lane_pack.hpp"
-#include "ricochet/taylor/detail/taylor_door.hpp"
+#include "ricochet/taylor/detail/taylor_adapter.hpp"
 #include "ricochet/taylor/detail/taylor_series.hpp"
 #include "ricochet/taylor/detail/taylor_step.hpp"
 
@@ -159,7 +159,7 @@ class TaylorLanes {
     using Pack = LanePack<wide>;
     using Mask = LaneMask<wide>;
     static constexpr std::size_t n = fixed_size<X>();
-    using D = TaylorDoor<System, X, n>;
+    using D = TaylorAdapter<System, X, n>;
     using C = CoreState<X>;
     using State = StepState<C>;
     using Y = typename D::Room::Guarded;
@@ -169,7 +169,7 @@ class TaylorLanes {
     using Series = TaylorSeries<tape, most_taylor_order, true, Pack>;
 
 public:
-    using Door = D;
+    using SystemAdapter = D;
 
     /// Sets the options that all runs have in common.
     /// @param order  of their series
@@ -187,13 +187,13 @@ public:
     }
 
     /// Takes over a run before steps that may be quiet.
-    void load(std::size_t lane, D& door, State& state, const QuietRun& quiet)
+    void load(std::size_t lane, D& adapter, State& state, const QuietRun& quiet)
     {
         // Lanes that were never used get the numbers of this run too; their results are ignored.
         for (std::size_t to = 0; to < lane_count; ++to) {
-            if (to == lane || !used_[to]) put(to, door, state, quiet);
+            if (to == lane || !used_[to]) put(to, adapter, state, quiet);
         }
-        runs_[lane] = {&door, &state};
+        runs_[lane] = {&adapter, &state};
         used_[lane] = true;
         active_.set(lane, true);
     }
@@ -202,7 +202,7 @@ public:
     /// is known, as after `advance`.
     void store(std::size_t lane, QuietRun& quiet, bool expanded)
     {
-        const auto& [door, state] = runs_[lane];
+        const auto& [adapter, state] = runs_[lane];
         active_.set(lane, false);
         quiet.why = QuietEnd::due;
         quiet.repeated = false;
@@ -218,7 +218,7 @@ public:
             state->asked_alone = 0;
         }
         state->start = {start_[lane], start_remainder_[lane]};
-        auto& step = door->step;
+        auto& step = adapter->step;
         for (std::size_t i = 0; i < n; ++i) {
             state->x0[i] = step.x[i] = x0_[i][lane];
             state->remainder[i] = remainder_[i][lane];
@@ -253,9 +253,9 @@ public:
 #endif
 
 private:
-    void put(std::size_t lane, D& door, const State& state, const QuietRun& quiet)
+    void put(std::size_t lane, D& adapter, const State& state, const QuietRun& quiet)
     {
-        const auto& constants = door.constants(0);
+        const auto& constants = adapter.constants(0);
         for (std::size_t i = 0; i < constants.size(); ++i) constants_[i].set(lane, constants[i]);
         for (std::size_t i = 0; i < n; ++i) {
             x0_[i].set(lane, state.x0[i]);
@@ -373,10 +373,10 @@ private:
             if (!fine[lane]) continue;
             Y x;
             for (std::size_t i = 0; i < n; ++i) x[own(i, x)] = x1[i][lane];
-            const auto& [door, state] = runs_[lane];
+            const auto& [adapter, state] = runs_[lane];
             std::uint64_t calls = 0;
             try {
-                const Guard guard(door->system(), calls,
+                const Guard guard(adapter->system(), calls,
                                   {.mode = state->mode, .backward = backward_});
                 g1.set(lane, guard.value(t[lane], x));
             } catch (...) {
@@ -416,7 +416,7 @@ private:
     }
 
     struct LaneRun {
-        D* door = nullptr;
+        D* adapter = nullptr;
         State* state = nullptr;
     };
 

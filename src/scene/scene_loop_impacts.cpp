@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "scene/runner.hpp"
+#include "scene/scene_loop.hpp"
 
 namespace ricochet::detail {
 
@@ -27,7 +27,7 @@ constexpr double loose = 1e-10;
 
 }  // namespace
 
-std::uint32_t Runner::slot_of(std::uint32_t body)
+std::uint32_t SceneLoop::slot_of(std::uint32_t body)
 {
     std::uint32_t& slot = slots_[body];
     if (slot == none) {
@@ -38,7 +38,7 @@ std::uint32_t Runner::slot_of(std::uint32_t body)
     return slot;
 }
 
-void Runner::gather(std::uint32_t i, const Pending& seed)
+void SceneLoop::gather(std::uint32_t i, const Pending& seed)
 {
     cluster_.clear();
     slot_of(i);
@@ -65,7 +65,7 @@ void Runner::gather(std::uint32_t i, const Pending& seed)
 
 /// Computes how pushes move the discs of systems. A cluster contains all discs of a system, or
 /// none.
-void Runner::add_couplings()
+void SceneLoop::add_couplings()
 {
     for (std::uint32_t by = 0; by < cluster_.bodies.size(); ++by) {
         const Body& pushed = world_.bodies[cluster_.bodies[by]];
@@ -102,7 +102,7 @@ static double closing_speed(const Face& face, const Vector2& p, const Vector2& v
 
 /// Segments and arcs that a point touches now, and its side of each, from the record that has led
 /// there; the segment `sure` is the first of them, at any distance.
-std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
+std::vector<Side> SceneLoop::sides_of(std::uint32_t i, std::uint32_t sure) const
 {
     std::vector<Side> sides;
     const Body& body = world_.bodies[i];
@@ -139,7 +139,7 @@ std::vector<Side> Runner::sides_of(std::uint32_t i, std::uint32_t sure) const
 }
 
 /// Gathers contacts of a body of the cluster with faces; `sure` counts as touched at any gap.
-void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
+void SceneLoop::gather_faces(std::uint32_t slot, std::uint32_t sure)
 {
     const std::uint32_t i = cluster_.bodies[slot];
     const Body& body = world_.bodies[i];
@@ -215,21 +215,21 @@ void Runner::gather_faces(std::uint32_t slot, std::uint32_t sure)
 
 /// [m] Gap left by a group in lasting contact: in one of its steps, surfaces move on straight
 /// lines.
-double Runner::loose_motion(std::uint32_t face, double size) const
+double SceneLoop::loose_motion(std::uint32_t face, double size) const
 {
     const double h = world_.options.contact_step;
     return loose * size + 0.125 * world_.moving(face).bounds.acceleration * h * h;
 }
 
 /// Notes laws of a contact that are not constants.
-void Runner::set_laws(Contact& contact, std::uint32_t a, std::uint32_t b) const
+void SceneLoop::set_laws(Contact& contact, std::uint32_t a, std::uint32_t b) const
 {
     contact.by_speed = world_.depends_on_speed(a, b);
     if (!contact.surface) return;
     contact.thermal = world_.scene.surfaces()[world_.faces[contact.b].surface].temperature > 0;
 }
 
-void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
+void SceneLoop::gather_pairs(std::uint32_t slot, std::uint32_t sure)
 {
     const std::uint32_t i = cluster_.bodies[slot];
     const Body& a = world_.bodies[i];
@@ -249,7 +249,7 @@ void Runner::gather_pairs(std::uint32_t slot, std::uint32_t sure)
     });
 }
 
-void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
+void SceneLoop::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
 {
     if (slots_[j] != none && slots_[j] < slot) return;  // gathered from there
     const std::uint32_t i = cluster_.bodies[slot];
@@ -287,7 +287,7 @@ void Runner::try_pair(std::uint32_t slot, std::uint32_t j, bool sure)
 
 /// Whether impacts of a body follow each other more closely than the time resolves or, where groups
 /// in lasting contact can take over, than its place resolves.
-bool Runner::collapses(std::uint32_t slot)
+bool SceneLoop::collapses(std::uint32_t slot)
 {
     const std::uint32_t i = cluster_.bodies[slot];
     Series& series = series_[i];
@@ -313,7 +313,7 @@ bool Runner::collapses(std::uint32_t slot)
 /// to rise above the rounding of its place. Friction leads into such hops, for instance between the
 /// two sides of a corner, both of which the body strikes at a right angle; there it dissipates no
 /// more energy.
-bool Runner::hops_below_rounding(std::uint32_t slot)
+bool SceneLoop::hops_below_rounding(std::uint32_t slot)
 {
     const std::uint32_t i = cluster_.bodies[slot];
     const Body& body = world_.bodies[i];
@@ -334,7 +334,7 @@ bool Runner::hops_below_rounding(std::uint32_t slot)
 
 /// Takes systems of the cluster through their own events of this instant, before an impact: a push
 /// starts a new search for events, which finds later ones only. Returns whether there were any.
-bool Runner::let_events_happen()
+bool SceneLoop::let_events_happen()
 {
     bool any = false;
     for (const std::uint32_t i : cluster_.bodies) {
@@ -348,7 +348,7 @@ bool Runner::let_events_happen()
     return any;
 }
 
-void Runner::impact(std::uint32_t i)
+void SceneLoop::impact(std::uint32_t i)
 {
     if (strikes_alone(i)) return;
     gather(i, pending_[i]);
@@ -357,7 +357,7 @@ void Runner::impact(std::uint32_t i)
 }
 
 /// Resolves the impacts of the cluster that was gathered around i.
-void Runner::resolve_cluster(std::uint32_t i)
+void SceneLoop::resolve_cluster(std::uint32_t i)
 {
     const double within = world_.options.elastic_within;
     if (within > 0) {
@@ -418,8 +418,8 @@ void Runner::resolve_cluster(std::uint32_t i)
 }
 
 /// Starts a flight of a body in closed form. Returns the face that held it before.
-std::uint32_t Runner::begin_record(std::uint32_t i, const Vector2& velocity,
-                                   const std::vector<Side>& sides)
+std::uint32_t SceneLoop::begin_record(std::uint32_t i, const Vector2& velocity,
+                                      const std::vector<Side>& sides)
 {
     Body& body = world_.bodies[i];
     const double s = seconds(body.t, now_);
@@ -438,7 +438,7 @@ std::uint32_t Runner::begin_record(std::uint32_t i, const Vector2& velocity,
 
 /// Writes new records of bodies whose velocity has changed, and predicts their meetings. Counts the
 /// event if there were impacts, before groups and bounces add events of their own.
-void Runner::apply(bool struck)
+void SceneLoop::apply(bool struck)
 {
     changed_.clear();
     std::vector<std::uint32_t>& islands = slots_of_islands_;
@@ -496,7 +496,7 @@ void Runner::apply(bool struck)
 }
 
 /// Continues a system from the state to which its discs have been pushed.
-bool Runner::push_system(std::uint32_t island)
+bool SceneLoop::push_system(std::uint32_t island)
 {
     velocities_.clear();
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
@@ -521,7 +521,7 @@ bool Runner::push_system(std::uint32_t island)
     return true;
 }
 
-void Runner::restart_island(std::uint32_t island)
+void SceneLoop::restart_island(std::uint32_t island)
 {
     if (world_.islands->is_system(island)) {
         if (!push_system(island)) return fail_island(island);
@@ -540,7 +540,7 @@ void Runner::restart_island(std::uint32_t island)
 }
 
 /// Continues an island from the present time with the changed `velocities_`.
-void Runner::continue_island(std::uint32_t island)
+void SceneLoop::continue_island(std::uint32_t island)
 {
     Islands& islands = *world_.islands;
     const bool taken = islands.restart(island, now_, velocities_);

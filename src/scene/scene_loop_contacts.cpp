@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "scene/runner.hpp"
+#include "scene/scene_loop.hpp"
 
 namespace ricochet::detail {
 
@@ -21,7 +21,7 @@ constexpr double ahead = 5;
 }  // namespace
 
 /// Whether the group of a body meets this face or body itself.
-bool Runner::known_to_group(std::uint32_t i, bool surface, std::uint32_t other) const
+bool SceneLoop::known_to_group(std::uint32_t i, bool surface, std::uint32_t other) const
 {
     const std::uint32_t group = world_.bodies[i].contact;
     if (group == none) return false;
@@ -32,7 +32,7 @@ bool Runner::known_to_group(std::uint32_t i, bool surface, std::uint32_t other) 
 }
 
 /// Whether a contact is between a group and something outside it.
-bool Runner::across(const Contact& contact) const
+bool SceneLoop::across(const Contact& contact) const
 {
     const bool first = world_.bodies[contact.a].contact != none;
     const bool second = !contact.surface && world_.bodies[contact.b].contact != none;
@@ -41,7 +41,7 @@ bool Runner::across(const Contact& contact) const
 
 /// Bodies in contact across a group's boundary, on both sides, that approach at more than `least`
 /// and less than `most` [m/s].
-std::vector<std::uint32_t> Runner::joining(double least, double most) const
+std::vector<std::uint32_t> SceneLoop::joining(double least, double most) const
 {
     std::vector<std::uint32_t> bodies;
     for (const Contact& contact : cluster_.contacts) {
@@ -54,7 +54,7 @@ std::vector<std::uint32_t> Runner::joining(double least, double most) const
     return bodies;
 }
 
-std::vector<std::uint32_t> Runner::faces_near(const std::vector<std::uint32_t>& members) const
+std::vector<std::uint32_t> SceneLoop::faces_near(const std::vector<std::uint32_t>& members) const
 {
     std::vector<std::uint32_t> faces;
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) faces.push_back(f);
@@ -83,7 +83,7 @@ std::vector<std::uint32_t> Runner::faces_near(const std::vector<std::uint32_t>& 
 }
 
 /// Handles a body pressed onto another one, or onto a surface; every body that touches it joins it.
-void Runner::press(std::uint32_t i, const std::string& sentence)
+void SceneLoop::press(std::uint32_t i, const std::string& sentence)
 {
     gather(i, pending_[i]);
     std::vector<std::uint32_t> bodies = cluster_.bodies;
@@ -96,7 +96,7 @@ void Runner::press(std::uint32_t i, const std::string& sentence)
     hand_over(bodies, sentence);
 }
 
-void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::string& sentence)
+void SceneLoop::hand_over(const std::vector<std::uint32_t>& bodies, const std::string& sentence)
 {
     if (!contacts_.available()) {
         return fail(Outcome::zeno, bodies,
@@ -130,7 +130,7 @@ void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::stri
         const Body& body = world_.bodies[i];
         if (body.contact == none) {
             joined.push_back(i);
-            Patience& own = patience_[i];
+            Backoff& own = patience_[i];
             own.steps = next_patience(own.steps, -seconds(own.released, now_), 0,
                                       world_.options.contact_step);
             if (body.island != none) {
@@ -164,7 +164,7 @@ void Runner::hand_over(const std::vector<std::uint32_t>& bodies, const std::stri
     }
 }
 
-void Runner::note_group(SceneEvent::Kind kind, std::uint32_t i)
+void SceneLoop::note_group(SceneEvent::Kind kind, std::uint32_t i)
 {
     if (!world_.options.record_events) return;
     SceneEvent event{.t = now_.value, .number = result_.event_count, .kind = kind, .body = i};
@@ -175,7 +175,7 @@ void Runner::note_group(SceneEvent::Kind kind, std::uint32_t i)
 }
 
 /// Plans the next step of a group, and predicts the impacts of its bodies during that step.
-void Runner::plan_group(std::uint32_t number)
+void SceneLoop::plan_group(std::uint32_t number)
 {
     const bool slept = world_.bodies[contacts_[number].members[0]].asleep;
     const IslandOutcome outcome = contacts_.plan(number, now_, t_end_);
@@ -211,7 +211,7 @@ void Runner::plan_group(std::uint32_t number)
     }
 }
 
-void Runner::step_group(std::uint32_t number)
+void SceneLoop::step_group(std::uint32_t number)
 {
     const bool arrival = contacts_[number].outcome == IslandOutcome::impact;
     contacts_.commit(number, now_);
@@ -220,7 +220,7 @@ void Runner::step_group(std::uint32_t number)
 }
 
 /// Resolves an impact between bodies of one group that meet fast enough to rebound.
-void Runner::arrive(std::uint32_t number)
+void SceneLoop::arrive(std::uint32_t number)
 {
     const std::uint32_t first = contacts_[number].motion->arrivals().at(0).first;
     gather(first, Pending{});
@@ -230,7 +230,7 @@ void Runner::arrive(std::uint32_t number)
 }
 
 /// Continues a group after an impact.
-void Runner::restart_group(std::uint32_t number)
+void SceneLoop::restart_group(std::uint32_t number)
 {
     contacts_.commit(number, now_);
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
@@ -245,7 +245,7 @@ void Runner::restart_group(std::uint32_t number)
 
 /// Whether a body that no other one of its group touches can go on without it: in flight, on a wall
 /// or on the inside of a segment that does not move.
-bool Runner::may_leave(std::uint32_t number, std::uint32_t i) const
+bool SceneLoop::may_leave(std::uint32_t number, std::uint32_t i) const
 {
     const Body& body = world_.bodies[i];
     if (body.island != none) return false;
@@ -261,7 +261,7 @@ bool Runner::may_leave(std::uint32_t number, std::uint32_t i) const
 }
 
 /// Splits a group whose parts have been apart for some steps into several groups.
-bool Runner::divide(std::uint32_t number)
+bool SceneLoop::divide(std::uint32_t number)
 {
     Contacts::Group& group = contacts_[number];
     auto parts = group.motion->groups();
@@ -299,7 +299,7 @@ bool Runner::divide(std::uint32_t number)
 }
 
 /// Releases a group without contact for as long as its patience requires.
-void Runner::release(std::uint32_t number)
+void SceneLoop::release(std::uint32_t number)
 {
     const std::vector<std::uint32_t> members = contacts_[number].members;
     calendar_.set(entry_of_group(number), no_instant);
@@ -307,7 +307,7 @@ void Runner::release(std::uint32_t number)
     set_free(members);
 }
 
-void Runner::set_free(const std::vector<std::uint32_t>& bodies)
+void SceneLoop::set_free(const std::vector<std::uint32_t>& bodies)
 {
     std::vector<std::uint32_t> islands;
     for (const std::uint32_t i : bodies) {

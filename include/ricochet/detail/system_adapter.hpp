@@ -85,7 +85,7 @@ template <class X>
 
 /// Argument of the functions of the table: the system, and memory for states of its own type.
 template <class System, class UserState>
-class Door {
+class SystemAdapter {
 public:
     using X = UserState;
     using Core = CoreState<X>;
@@ -93,7 +93,7 @@ public:
     static constexpr bool overlaid = !same && is_array<X>;
     static constexpr bool copied = !same && !overlaid;
 
-    Door(const System& system, [[maybe_unused]] const X& like) : system_(&system)
+    SystemAdapter(const System& system, [[maybe_unused]] const X& like) : system_(&system)
     {
         if constexpr (copied) scratch_.fill(like);
     }
@@ -163,95 +163,99 @@ private:
 /// The table of `System` for states X.
 template <class System, class X>
 class TableOf {
-    using D = Door<System, X>;
+    using D = SystemAdapter<System, X>;
     using C = typename D::Core;
     using View = PolynomialView<C, false>;
     using RateView = PolynomialView<C, true>;
     using Guard = GuardView<System, X>;
 
-    [[nodiscard]] static D& at(void* door) noexcept { return *static_cast<D*>(door); }
-    [[nodiscard]] static const System& system(void* door) noexcept { return at(door).system(); }
+    [[nodiscard]] static D& at(void* adapter) noexcept { return *static_cast<D*>(adapter); }
+    [[nodiscard]] static const System& system(void* adapter) noexcept
+    {
+        return at(adapter).system();
+    }
 
     // --- guards; evaluations are counted by the loop ---
 
-    static void guards(void* door, Mode mode, double t, const C& x, std::span<double> g)
+    static void guards(void* adapter, Mode mode, double t, const C& x, std::span<double> g)
     {
-        call_guards(system(door), mode, t, at(door).read(x, 0), g);
+        call_guards(system(adapter), mode, t, at(adapter).read(x, 0), g);
     }
-    static double guard(void* door, std::size_t which, Mode mode, double t, const C& x)
+    static double guard(void* adapter, std::size_t which, Mode mode, double t, const C& x)
     {
         std::uint64_t calls = 0;
-        return Guard(system(door), calls, {which, mode}).value(t, at(door).read(x, 0));
+        return Guard(system(adapter), calls, {which, mode}).value(t, at(adapter).read(x, 0));
     }
-    static double guard_on(void* door, std::size_t which, Mode mode, double t, const View& x)
+    static double guard_on(void* adapter, std::size_t which, Mode mode, double t, const View& x)
     {
         std::uint64_t calls = 0;
-        return Guard(system(door), calls, {which, mode}).value(t, x);
+        return Guard(system(adapter), calls, {which, mode}).value(t, x);
     }
-    static double rate(void* door, GuardInMode of, ScaledTime time, const C& x, const C& dxdt)
+    static double rate(void* adapter, GuardInMode of, ScaledTime time, const C& x, const C& dxdt)
     {
         std::uint64_t calls = 0;
-        return Guard(system(door), calls, of)
-            .rate(time.t, at(door).read(x, 0), at(door).read(dxdt, 1), time.scale);
+        return Guard(system(adapter), calls, of)
+            .rate(time.t, at(adapter).read(x, 0), at(adapter).read(dxdt, 1), time.scale);
     }
-    static GuardPoint point(void* door, GuardInMode of, ScaledTime time, const C& x, const C& dxdt)
+    static GuardPoint point(void* adapter, GuardInMode of, ScaledTime time, const C& x,
+                            const C& dxdt)
     {
         std::uint64_t calls = 0;
-        const Guard guard(system(door), calls, of);
-        const X& state = at(door).read(x, 0);
+        const Guard guard(system(adapter), calls, of);
+        const X& state = at(adapter).read(x, 0);
         return {guard.value(time.t, state),
-                guard.rate(time.t, state, at(door).read(dxdt, 1), time.scale)};
+                guard.rate(time.t, state, at(adapter).read(dxdt, 1), time.scale)};
     }
-    static double rate_on(void* door, GuardInMode of, ScaledTime time, const View& x,
+    static double rate_on(void* adapter, GuardInMode of, ScaledTime time, const View& x,
                           const RateView& dxdt)
     {
         std::uint64_t calls = 0;
-        return Guard(system(door), calls, of).rate(time.t, x, dxdt, time.scale);
+        return Guard(system(adapter), calls, of).rate(time.t, x, dxdt, time.scale);
     }
-    static void rates(void* door, const Along<C>& motion, std::span<double> rates)
+    static void rates(void* adapter, const Along<C>& motion, std::span<double> rates)
     {
-        const X& state = at(door).read(motion.x, 0);
-        const X& rate = at(door).read(motion.s, 1);
-        call_rates(system(door), Along{motion.mode, motion.t, state, rate}, rates);
+        const X& state = at(adapter).read(motion.x, 0);
+        const X& rate = at(adapter).read(motion.s, 1);
+        call_rates(system(adapter), Along{motion.mode, motion.t, state, rate}, rates);
     }
-    static void each_rate(void* door, const Along<C>& motion, std::span<double> rates)
+    static void each_rate(void* adapter, const Along<C>& motion, std::span<double> rates)
     {
-        const System& of = system(door);
-        const X& state = at(door).read(motion.x, 0);
-        const X& rate = at(door).read(motion.s, 1);
+        const System& of = system(adapter);
+        const X& state = at(adapter).read(motion.x, 0);
+        const X& rate = at(adapter).read(motion.s, 1);
         const Along along{motion.mode, motion.t, state, rate};
         for (std::size_t i = 0; i < rates.size(); ++i) rates[i] = call_rate(of, i, along);
     }
 
     // --- resets ---
 
-    static Mode reset(void* door, std::size_t which, Mode mode, double t, C& x)
+    static Mode reset(void* adapter, std::size_t which, Mode mode, double t, C& x)
     {
-        return at(door).edit(x, [&](X& state) {
-            return call_reset(system(door), which, at(door).direction(), mode, t, state);
+        return at(adapter).edit(x, [&](X& state) {
+            return call_reset(system(adapter), which, at(adapter).direction(), mode, t, state);
         });
     }
-    static Mode reset_set(void* door, const FiredGuards& fired, Mode mode, double t, C& x)
+    static Mode reset_set(void* adapter, const FiredGuards& fired, Mode mode, double t, C& x)
     {
-        return at(door).edit(
-            x, [&](X& state) { return call_reset_set(system(door), fired, mode, t, state); });
+        return at(adapter).edit(
+            x, [&](X& state) { return call_reset_set(system(adapter), fired, mode, t, state); });
     }
-    static Mode after_set(void* door, const FiredGuards& fired, Mode mode, double t,
+    static Mode after_set(void* adapter, const FiredGuards& fired, Mode mode, double t,
                           const C& before, C& x)
     {
-        const X& was = at(door).read(before, 0);
-        return at(door).edit(
-            x, [&](X& state) { return system(door).after_set(fired, mode, t, was, state); });
+        const X& was = at(adapter).read(before, 0);
+        return at(adapter).edit(
+            x, [&](X& state) { return system(adapter).after_set(fired, mode, t, was, state); });
     }
-    static Mode rest(void* door, std::size_t which, Mode mode, double t, C& x)
+    static Mode rest(void* adapter, std::size_t which, Mode mode, double t, C& x)
     {
-        return at(door).edit(
-            x, [&](X& state) { return call_rest(system(door), which, mode, t, state); });
+        return at(adapter).edit(
+            x, [&](X& state) { return call_rest(system(adapter), which, mode, t, state); });
     }
-    static Mode time_reset(void* door, Mode mode, double t, C& x)
+    static Mode time_reset(void* adapter, Mode mode, double t, C& x)
     {
-        return at(door).edit(
-            x, [&](X& state) { return call_time_reset(system(door), mode, t, state); });
+        return at(adapter).edit(
+            x, [&](X& state) { return call_time_reset(system(adapter), mode, t, state); });
     }
 
     static constexpr void add_guards(SystemTable<C>& table)
@@ -259,9 +263,9 @@ class TableOf {
         table.guarded = true;
         table.rated = RatedGuard<System, X>;
         table.guard_alone = GuardAlone<System, X>;
-        table.guard_count = [](void* door) { return guard_count_of<X>(system(door)); };
-        table.info = [](void* door, std::size_t which) {
-            return guard_info_of<X>(system(door), which);
+        table.guard_count = [](void* adapter) { return guard_count_of<X>(system(adapter)); };
+        table.info = [](void* adapter, std::size_t which) {
+            return guard_info_of<X>(system(adapter), which);
         };
         table.guards = &guards;
         if constexpr (!GuardsTogether<System, X> && !RatesTogether<System, X>) {
@@ -280,13 +284,14 @@ class TableOf {
             table.each_rate = &each_rate;
         }
         if constexpr (EnabledIn<System>) {
-            table.enabled_in = [](void* door, std::size_t which, Mode mode) {
-                return call_enabled_in(system(door), which, mode);
+            table.enabled_in = [](void* adapter, std::size_t which, Mode mode) {
+                return call_enabled_in(system(adapter), which, mode);
             };
         }
         if constexpr (EnabledAt<System, X>) {
-            table.enabled_at = [](void* door, std::size_t which, Mode mode, double t, const C& x) {
-                return call_enabled_at(system(door), which, mode, t, at(door).read(x, 0));
+            table.enabled_at = [](void* adapter, std::size_t which, Mode mode, double t,
+                                  const C& x) {
+                return call_enabled_at(system(adapter), which, mode, t, at(adapter).read(x, 0));
             };
         }
         if constexpr (ResetsTogether<System, X>) {
@@ -294,16 +299,16 @@ class TableOf {
         } else if constexpr (Resetting<System, X>) {
             table.reset = &reset;
             if constexpr (DirectedReset<System, X>) {
-                table.tell_direction = [](void* door, Crossing direction) {
-                    at(door).tell_direction(direction);
+                table.tell_direction = [](void* adapter, Crossing direction) {
+                    at(adapter).tell_direction(direction);
                 };
             }
         }
         if constexpr (DecidesAfterSets<System, X>) table.after_set = &after_set;
         if constexpr (Resting<System, X>) table.rest = &rest;
         if constexpr (Resting<System, X> && RestsAtSome<System>) {
-            table.rests = [](void* door, std::size_t which, std::size_t other) -> bool {
-                return system(door).rests(which, other);
+            table.rests = [](void* adapter, std::size_t which, std::size_t other) -> bool {
+                return system(adapter).rests(which, other);
             };
         }
     }
@@ -314,27 +319,28 @@ class TableOf {
                       "ricochet: found several of Times time_events, next_time_event(t) and "
                       "next_time_event([mode,] t, x); expected one of them");
         if constexpr (ListsTimes<System>) {
-            table.next_time_event = [](void* door, double t) {
-                return times_of(system(door)).next(t);
+            table.next_time_event = [](void* adapter, double t) {
+                return times_of(system(adapter)).next(t);
             };
-            table.previous_time_event = [](void* door, double t) {
-                return times_of(system(door)).previous(t);
+            table.previous_time_event = [](void* adapter, double t) {
+                return times_of(system(adapter)).previous(t);
             };
-            table.time_event_count = [](void* door, double t) {
-                return times_of(system(door)).count(t);
+            table.time_event_count = [](void* adapter, double t) {
+                return times_of(system(adapter)).count(t);
             };
         } else if constexpr (TimedByState<System, X>) {
-            table.next_time_event_at = [](void* door, Mode mode, double t, const C& x) -> double {
-                return call_timer(system(door), mode, t, at(door).read(x, 0));
+            table.next_time_event_at = [](void* adapter, Mode mode, double t,
+                                          const C& x) -> double {
+                return call_timer(system(adapter), mode, t, at(adapter).read(x, 0));
             };
         } else {
-            table.next_time_event = [](void* door, double t) -> double {
-                return system(door).next_time_event(t);
+            table.next_time_event = [](void* adapter, double t) -> double {
+                return system(adapter).next_time_event(t);
             };
         }
         if constexpr (requires(const System& s, double t) { s.previous_time_event(t); }) {
-            table.previous_time_event = [](void* door, double t) -> double {
-                return system(door).previous_time_event(t);
+            table.previous_time_event = [](void* adapter, double t) -> double {
+                return system(adapter).previous_time_event(t);
             };
         }
         if constexpr (TimeResetting<System, X>) table.time_reset = &time_reset;
@@ -343,24 +349,26 @@ class TableOf {
     static constexpr void add_bounds(SystemTable<C>& table)
     {
         table.bounded = true;
-        table.lipschitz = [](void* door, std::size_t which) {
-            return call_lipschitz(system(door), which);
+        table.lipschitz = [](void* adapter, std::size_t which) {
+            return call_lipschitz(system(adapter), which);
         };
-        table.speed_bound = [](void* door, std::size_t which, Mode mode, double t, const C& x) {
-            return call_speed_bound(system(door), which, mode, t, at(door).read(x, 0));
+        table.speed_bound = [](void* adapter, std::size_t which, Mode mode, double t, const C& x) {
+            return call_speed_bound(system(adapter), which, mode, t, at(adapter).read(x, 0));
         };
-        table.acceleration_bound = [](void* door, std::size_t which, Mode mode, double t,
+        table.acceleration_bound = [](void* adapter, std::size_t which, Mode mode, double t,
                                       const C& x) {
-            return call_acceleration_bound(system(door), which, mode, t, at(door).read(x, 0));
+            return call_acceleration_bound(system(adapter), which, mode, t, at(adapter).read(x, 0));
         };
         if constexpr (HasLowerBound<System, X>) {
-            table.lower_bound = [](void* door, std::size_t which, Mode mode, double t, const C& x) {
-                return call_lower_bound(system(door), which, mode, t, at(door).read(x, 0));
+            table.lower_bound = [](void* adapter, std::size_t which, Mode mode, double t,
+                                   const C& x) {
+                return call_lower_bound(system(adapter), which, mode, t, at(adapter).read(x, 0));
             };
         }
         if constexpr (HasUpperBound<System, X>) {
-            table.upper_bound = [](void* door, std::size_t which, Mode mode, double t, const C& x) {
-                return call_upper_bound(system(door), which, mode, t, at(door).read(x, 0));
+            table.upper_bound = [](void* adapter, std::size_t which, Mode mode, double t,
+                                   const C& x) {
+                return call_upper_bound(system(adapter), which, mode, t, at(adapter).read(x, 0));
             };
         }
     }
@@ -379,12 +387,12 @@ public:
         {
             requires System::forward_only;
         };
-        table.flow = [](void* door, Mode mode, double t, const C& x, C& dxdt) {
-            return at(door).flow(mode, t, x, dxdt);
+        table.flow = [](void* adapter, Mode mode, double t, const C& x, C& dxdt) {
+            return at(adapter).flow(mode, t, x, dxdt);
         };
-        table.mode_count = [](void* door) { return mode_count_of(system(door)); };
+        table.mode_count = [](void* adapter) { return mode_count_of(system(adapter)); };
         table.guard_count = [](void*) { return std::size_t{0}; };
-        table.name = [](void* door) { return name_of_system(system(door)); };
+        table.name = [](void* adapter) { return name_of_system(system(adapter)); };
         if constexpr (Guarded<System, X>) add_guards(table);
         if constexpr (Timed<System> || TimedByState<System, X>) add_times(table);
         if constexpr (BoundedGuards<System, X>) add_bounds(table);

@@ -10,7 +10,7 @@
 #include <type_traits>
 
 #include "ricochet/detail/components.hpp"
-#include "ricochet/detail/door.hpp"
+#include "ricochet/detail/system_adapter.hpp"
 #include "ricochet/methods.hpp"
 
 namespace ricochet::detail {
@@ -94,14 +94,14 @@ void check_departures(const X& like)
     }
 }
 
-/// A door with the data of a user-defined stepper.
+/// A adapter with the data of a user-defined stepper.
 template <class System, class X, class Method>
-struct StepperDoor : Door<System, X> {
+struct StepperAdapter : SystemAdapter<System, X> {
     using Stepper = typename Method::template Stepper<X>;
 
     /// @throws std::invalid_argument if states can be neither made nor resized to the size of
     /// `like`, or the stepper does not take steps of departures
-    StepperDoor(const System& system, const X& like) : Door<System, X>(system, like)
+    StepperAdapter(const System& system, const X& like) : SystemAdapter<System, X>(system, like)
     {
         if constexpr (fixed_size<X>() == 0 && !requires(X & x) { x.resize(0); }) {
             const auto made = static_cast<std::size_t>(X{}.size());
@@ -116,9 +116,9 @@ struct StepperDoor : Door<System, X> {
 };
 template <class System, class X, class Method>
 requires(NameOf<Method>::known ||
-         std::is_same_v<Method, MethodByName>) struct StepperDoor<System, X, Method>
-    : Door<System, X> {
-    using Door<System, X>::Door;
+         std::is_same_v<Method, MethodByName>) struct StepperAdapter<System, X, Method>
+    : SystemAdapter<System, X> {
+    using SystemAdapter<System, X>::SystemAdapter;
 };
 
 }  // namespace ricochet::detail

@@ -1,5 +1,5 @@
 // The loop of a scene: the next body to act, and its meetings and crossings.
-#include "scene/runner.hpp"
+#include "scene/scene_loop.hpp"
 
 #include <fmt/format.h>
 
@@ -24,7 +24,7 @@ constexpr std::uint64_t least_acts = 2048;
 
 }  // namespace
 
-Runner::Runner(World& world, double t_end)
+SceneLoop::SceneLoop(World& world, double t_end)
     : world_(world),
       t_end_{t_end, 0},
       calendar_(world.bodies.size() + world.islands->count() +
@@ -35,7 +35,7 @@ Runner::Runner(World& world, double t_end)
 {
 }
 
-void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events)
+void SceneLoop::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events)
 {
     members_.assign(bodies.begin(), bodies.end());
     pending_.begin(bodies);
@@ -60,7 +60,7 @@ void Runner::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent
     shown_ = result_.events.size();
 }
 
-void Runner::place_all()
+void SceneLoop::place_all()
 {
     const bool disc =
         std::ranges::any_of(members_, [&](std::uint32_t i) { return world_.bodies[i].radius > 0; });
@@ -79,7 +79,7 @@ void Runner::place_all()
 }
 
 /// Makes cells for the bodies at `places_`.
-void Runner::fill_cells()
+void SceneLoop::fill_cells()
 {
     grid_.size(world_, members_, places_, !islands_.empty());
     for (std::size_t k = 0; k < members_.size(); ++k) {
@@ -101,7 +101,7 @@ void Runner::fill_cells()
 }
 
 /// Where a body is now, as far as its cell is concerned.
-Vector2 Runner::place_now(std::uint32_t i) const
+Vector2 SceneLoop::place_now(std::uint32_t i) const
 {
     const Body& body = world_.bodies[i];
     const bool later = body.mapped || before(body.t, now_);
@@ -110,7 +110,7 @@ Vector2 Runner::place_now(std::uint32_t i) const
 
 /// Lays the cells for the present places. All meetings are predicted again, since cells that were
 /// neighbours are not any more; the predictions are those of before where both were made.
-void Runner::lay_cells_again()
+void SceneLoop::lay_cells_again()
 {
     places_.clear();
     for (const std::uint32_t i : members_) places_.push_back(place_now(i));
@@ -137,7 +137,7 @@ void Runner::lay_cells_again()
 
 /// Lays the cells again where tests and crossings an event have grown since they were laid. Where
 /// that changes little, the next look is later.
-void Runner::watch_work()
+void SceneLoop::watch_work()
 {
     const SceneStatistics& s = world_.statistics;
     if (world_.tuning.lay_after > 0) return lay_cells_again();
@@ -158,8 +158,8 @@ void Runner::watch_work()
     if (std::fabs(grid_.side() / before - 1) < 0.1) work_.interval *= 2;
 }
 
-GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
-                        std::vector<SceneEvent> events, Samples& samples)
+GroupResult SceneLoop::run(std::span<const std::uint32_t> bodies_of_group,
+                           std::vector<SceneEvent> events, Samples& samples)
 {
     begin(bodies_of_group, std::move(events));
     const bool bounces = bounces_from_start();
@@ -215,7 +215,7 @@ GroupResult Runner::run(std::span<const std::uint32_t> bodies_of_group,
     return std::move(result_);
 }
 
-void Runner::show_new_events()
+void SceneLoop::show_new_events()
 {
     for (; shown_ < result_.events.size(); ++shown_) {
         world_.options.observe(result_.events[shown_]);
@@ -225,7 +225,7 @@ void Runner::show_new_events()
     shown_ = 0;
 }
 
-void Runner::fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::string message)
+void SceneLoop::fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::string message)
 {
     if (result_.failure) return;
     result_.failure = Failure{outcome, now_, std::move(bodies), std::move(message)};
@@ -233,7 +233,7 @@ void Runner::fail(Outcome outcome, std::vector<std::uint32_t> bodies, std::strin
 
 /// Writes samples before t, and at t if `inclusive`: a sample at an event's time shows the state
 /// after.
-void Runner::sample_until(const Instant& t, bool inclusive, Samples& samples)
+void SceneLoop::sample_until(const Instant& t, bool inclusive, Samples& samples)
 {
     const auto& times = world_.options.sample_times;
     for (; next_sample_ < times.size(); ++next_sample_) {
@@ -250,7 +250,7 @@ void Runner::sample_until(const Instant& t, bool inclusive, Samples& samples)
     }
 }
 
-void Runner::fail_island(std::uint32_t island)
+void SceneLoop::fail_island(std::uint32_t island)
 {
     const Islands& islands = *world_.islands;
     const std::string first = called(islands.members(island)[0]);
@@ -263,14 +263,14 @@ void Runner::fail_island(std::uint32_t island)
 }
 
 /// Whether nothing but a body's steps happens up to t: no sample, no end of the run, no cancelling.
-bool Runner::nothing_before(const Instant& t) const
+bool SceneLoop::nothing_before(const Instant& t) const
 {
     const auto& times = world_.options.sample_times;
     if (next_sample_ < times.size() && !before(t, {times[next_sample_], 0})) return false;
     return !is_cancelled() && before(t, t_end_);
 }
 
-void Runner::step_island(std::uint32_t island)
+void SceneLoop::step_island(std::uint32_t island)
 {
     Islands& islands = *world_.islands;
     const Instant& end = islands.end(island);
@@ -291,7 +291,7 @@ void Runner::step_island(std::uint32_t island)
 
 /// Puts the end of an island's step into the calendar. At the end of the run only events of a
 /// system remain to be done.
-void Runner::schedule(std::uint32_t island)
+void SceneLoop::schedule(std::uint32_t island)
 {
     const Islands& islands = *world_.islands;
     const Instant& end = islands.end(island);
@@ -300,8 +300,8 @@ void Runner::schedule(std::uint32_t island)
                   goes_on ? end : no_instant);
 }
 
-void Runner::keep_if_first(std::uint32_t i, const Meeting& meeting, bool surface,
-                           std::uint32_t other)
+void SceneLoop::keep_if_first(std::uint32_t i, const Meeting& meeting, bool surface,
+                              std::uint32_t other)
 {
     const Instant t = meeting.from.after(meeting.after);
     Pending& pending = pending_[i];
@@ -320,7 +320,7 @@ void Runner::keep_if_first(std::uint32_t i, const Meeting& meeting, bool surface
     }
 }
 
-void Runner::consider_walls(std::uint32_t i)
+void SceneLoop::consider_walls(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
     if (body.contact != none) return;  // its group meets them
@@ -342,7 +342,7 @@ void Runner::consider_walls(std::uint32_t i)
 }
 
 /// Considers moving surfaces, which wake sleepers too.
-void Runner::consider_moving(std::uint32_t i)
+void SceneLoop::consider_moving(std::uint32_t i)
 {
     const auto count = static_cast<std::uint32_t>(world_.faces.size());
     for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
@@ -351,14 +351,14 @@ void Runner::consider_moving(std::uint32_t i)
     }
 }
 
-void Runner::fail_where_broken()
+void SceneLoop::fail_where_broken()
 {
     if (!world_.broken) return;
     const BrokenBound& broken = *world_.broken;
     fail(broken.non_finite ? Outcome::non_finite : Outcome::wrong_bound, {}, broken.sentence);
 }
 
-void Runner::consider_body(std::uint32_t i, std::uint32_t j)
+void SceneLoop::consider_body(std::uint32_t i, std::uint32_t j)
 {
     if (j == i) return;
     const std::uint32_t group = world_.bodies[i].contact;
@@ -367,12 +367,12 @@ void Runner::consider_body(std::uint32_t i, std::uint32_t j)
 }
 
 /// The same where the cell repeats.
-void Runner::consider_image(std::uint32_t i, std::uint32_t j)
+void SceneLoop::consider_image(std::uint32_t i, std::uint32_t j)
 {
     if (j != i) consider(i, meet_image(world_, i, j, now_), false, j);
 }
 
-void Runner::consider_faces(std::uint32_t i)
+void SceneLoop::consider_faces(std::uint32_t i)
 {
     for (const std::uint32_t f : faces_of(i)) {
         if (known_to_group(i, true, f)) continue;
@@ -380,7 +380,7 @@ void Runner::consider_faces(std::uint32_t i)
     }
 }
 
-void Runner::predict(std::uint32_t i)
+void SceneLoop::predict(std::uint32_t i)
 {
     Pending& pending = pending_[i];
     pending.t = pending.crossing = no_instant;
@@ -416,7 +416,7 @@ void Runner::predict(std::uint32_t i)
 }
 
 /// A sleeper has no entry in the calendar: the awake bodies around it may meet it now.
-void Runner::offer(std::uint32_t i)
+void SceneLoop::offer(std::uint32_t i)
 {
     grid_.each_near(world_.bodies, i, pending_[i].cell, [&](std::uint32_t j) {
         if (j == i || world_.bodies[j].asleep) return;
@@ -425,7 +425,7 @@ void Runner::offer(std::uint32_t i)
     });
 }
 
-void Runner::put_in_calendar(std::uint32_t i)
+void SceneLoop::put_in_calendar(std::uint32_t i)
 {
     const Pending& pending = pending_[i];
     const Instant& first = before(pending.crossing, pending.t) ? pending.crossing : pending.t;
@@ -443,7 +443,7 @@ static bool stays_in(const Square& square, double outside, const Vector2& p, con
 }
 
 /// The exit of a body that advances by a step with a polynomial: out of the margin.
-Runner::Exit Runner::exit_by_step(std::uint32_t i, const Square& square, double outside) const
+SceneLoop::Exit SceneLoop::exit_by_step(std::uint32_t i, const Square& square, double outside) const
 {
     if (stays_in(square, outside, world_.bodies[i].p, world_.bends[i].sweep)) return {};
     const Path path = world_.path(i, now_);
@@ -465,7 +465,8 @@ Runner::Exit Runner::exit_by_step(std::uint32_t i, const Square& square, double 
 }
 
 /// The exit of a body of a system out of the margin, as proved by the bound.
-Runner::Exit Runner::exit_by_bound(std::uint32_t i, const Square& square, double outside) const
+SceneLoop::Exit SceneLoop::exit_by_bound(std::uint32_t i, const Square& square,
+                                         double outside) const
 {
     const double most = world_.accelerations[i];
     const Path path = world_.path(i, now_);
@@ -481,7 +482,7 @@ Runner::Exit Runner::exit_by_bound(std::uint32_t i, const Square& square, double
 }
 
 /// Where a body leaves a square; it may already be a rounding outside.
-Runner::Exit Runner::exit_of(std::uint32_t i, const Square& square, double outside) const
+SceneLoop::Exit SceneLoop::exit_of(std::uint32_t i, const Square& square, double outside) const
 {
     const Body& body = world_.bodies[i];
     if (body.mapped) return exit_by_bound(i, square, outside);
@@ -516,7 +517,7 @@ Runner::Exit Runner::exit_of(std::uint32_t i, const Square& square, double outsi
             vertical ? way[1] : std::int8_t{0}};
 }
 
-void Runner::predict_crossing(std::uint32_t i)
+void SceneLoop::predict_crossing(std::uint32_t i)
 {
     Pending& pending = pending_[i];
     const Square square = grid_.square_of(world_.bodies[i], i, pending.cell);
@@ -526,7 +527,7 @@ void Runner::predict_crossing(std::uint32_t i)
     pending.across_y = exit.y;
 }
 
-void Runner::predict_leaving(std::uint32_t i)
+void SceneLoop::predict_leaving(std::uint32_t i)
 {
     OnTerrain& place = terrain_[i];
     const FaceTree& terrain = grid_.terrain(world_.bodies[i]);
@@ -534,7 +535,7 @@ void Runner::predict_leaving(std::uint32_t i)
 }
 
 /// Moves a body into the cell and the square of terrain to which a step has led it.
-void Runner::move_to_cell(std::uint32_t i)
+void SceneLoop::move_to_cell(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
     if (!celled_ && !on_terrain_) return;
@@ -543,7 +544,7 @@ void Runner::move_to_cell(std::uint32_t i)
     if (on_terrain_) terrain_[i].square = grid_.terrain(body).at(p);
 }
 
-void Runner::cross(std::uint32_t i)
+void SceneLoop::cross(std::uint32_t i)
 {
     ++world_.statistics.crossings;
     Pending& pending = pending_[i];
@@ -571,7 +572,7 @@ void Runner::cross(std::uint32_t i)
 
 /// Moves a body into the next square of terrain, and considers the faces that it could not touch
 /// before.
-void Runner::leave_square(std::uint32_t i)
+void SceneLoop::leave_square(std::uint32_t i)
 {
     ++world_.statistics.crossings;
     OnTerrain& own = terrain_[i];
@@ -594,7 +595,7 @@ void Runner::leave_square(std::uint32_t i)
 }
 
 /// Predicts when a body leaves the cell that repeats: from its record alone.
-void Runner::consider_border(std::uint32_t i)
+void SceneLoop::consider_border(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
     Pending& pending = pending_[i];
@@ -616,7 +617,7 @@ void Runner::consider_border(std::uint32_t i)
 }
 
 /// Takes a body that has left the cell to its image on the other side, and counts the period.
-void Runner::cross_border(std::uint32_t i)
+void SceneLoop::cross_border(std::uint32_t i)
 {
     ++world_.statistics.crossings;
     Body& body = world_.bodies[i];
@@ -638,14 +639,14 @@ void Runner::cross_border(std::uint32_t i)
     predict(i);
 }
 
-std::string Runner::presses_on(std::uint32_t i, const Face& face) const
+std::string SceneLoop::presses_on(std::uint32_t i, const Face& face) const
 {
     return fmt::format("{} presses on {}{}", called(i),
                        face.kind == Face::Kind::vertex ? "a corner or an end of " : "",
                        world_.scene.name_of(SurfaceId{face.surface}));
 }
 
-void Runner::happen(std::uint32_t i)
+void SceneLoop::happen(std::uint32_t i)
 {
     const Pending& pending = pending_[i];
     using Kind = Pending::Kind;

@@ -1,4 +1,4 @@
-// The door of a run whose flow and guards are formulas, for methods that take their derivatives.
+// The adapter of a run whose flow and guards are formulas, for methods that take their derivatives.
 #pragma once
 
 #include <algorithm>
@@ -10,22 +10,22 @@
 
 #include "formula.hpp"
 #include "forwarding.hpp"
-#include "ricochet/detail/stepper_door.hpp"
+#include "ricochet/detail/stepper_adapter.hpp"
 #include "ricochet/detail/system_table.hpp"
 #include "ricochet/dual.hpp"
 #include "source.hpp"
 
 namespace ricochet::python {
 
-/// Flow and guards for any scalar; all other functions are those of a door to the same system.
+/// Flow and guards for any scalar; all other functions are those of a adapter to the same system.
 class FormulaSystem {
 public:
     static constexpr bool unchecked_names = true;
     using State = python::State;
 
-    FormulaSystem(RunDoor& callbacks, const ModedFormula& flow,
+    FormulaSystem(RunAdapter& callbacks, const ModedFormula& flow,
                   std::vector<const ModedFormula*> guards, std::size_t modes)
-        : name(callbacks.table().name(callbacks.door())),
+        : name(callbacks.table().name(callbacks.adapter())),
           callbacks_(&callbacks),
           flow_(&flow),
           guards_(std::move(guards)),
@@ -35,12 +35,12 @@ public:
 
     std::string name;
 
-    [[nodiscard]] RunDoor& callbacks() const noexcept { return *callbacks_; }
+    [[nodiscard]] RunAdapter& callbacks() const noexcept { return *callbacks_; }
     [[nodiscard]] std::size_t mode_count() const noexcept { return modes_; }
     [[nodiscard]] std::size_t guard_count() const noexcept { return guards_.size(); }
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const
     {
-        return callbacks_->table().info(callbacks_->door(), which);
+        return callbacks_->table().info(callbacks_->adapter(), which);
     }
 
     template <class S>
@@ -77,45 +77,45 @@ private:
         return values;
     }
 
-    RunDoor* callbacks_;
+    RunAdapter* callbacks_;
     const ModedFormula* flow_;
     std::vector<const ModedFormula*> guards_;
     std::size_t modes_;
 };
 
-/// @param callbacks  a door to the system, used for resets and all functions other than flow and
+/// @param callbacks  a adapter to the system, used for resets and all functions other than flow and
 /// guards
 /// @tparam Method  of the steps: `TaylorOf<0>` or `Rosenbrock4`
 template <class Method>
-class FormulaDoor final : public RunDoor {
+class FormulaAdapter final : public RunAdapter {
     using Table = detail::SystemTable<State>;
 
 public:
-    FormulaDoor(std::unique_ptr<RunDoor> callbacks, const ModedFormula& flow,
-                std::vector<const ModedFormula*> guards, const State& x0)
+    FormulaAdapter(std::unique_ptr<RunAdapter> callbacks, const ModedFormula& flow,
+                   std::vector<const ModedFormula*> guards, const State& x0)
         : callbacks_(std::move(callbacks)),
           table_(detail::system_table<FormulaSystem, State>),
           system_(*callbacks_, flow, std::move(guards), flow.by_mode.size()),
-          door_(system_, x0)
+          adapter_(system_, x0)
     {
         Forwarding<FormulaSystem>::all_but_flow_and_guards(table_, callbacks_->table());
     }
 
     [[nodiscard]] const Table& table() const noexcept override { return table_; }
-    [[nodiscard]] void* door() noexcept override
+    [[nodiscard]] void* adapter() noexcept override
     {
-        return static_cast<detail::Door<FormulaSystem, State>*>(&door_);
+        return static_cast<detail::SystemAdapter<FormulaSystem, State>*>(&adapter_);
     }
     [[nodiscard]] bool is_free() const noexcept override { return callbacks_->is_free(); }
-    void choose_method(detail::RunSetup<State>& setup) override;
+    void choose_method(detail::RunBindings<State>& setup) override;
     [[nodiscard]] SignalWatch& watch() noexcept override { return callbacks_->watch(); }
     [[nodiscard]] ImplicitCounts& implicit() noexcept override { return callbacks_->implicit(); }
 
 private:
-    std::unique_ptr<RunDoor> callbacks_;
+    std::unique_ptr<RunAdapter> callbacks_;
     Table table_;
     FormulaSystem system_;
-    detail::StepperDoor<FormulaSystem, State, Method> door_;
+    detail::StepperAdapter<FormulaSystem, State, Method> adapter_;
 };
 
 }  // namespace ricochet::python

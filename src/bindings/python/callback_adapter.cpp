@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "callbacks.hpp"
-#include "formula_door.hpp"
+#include "formula_adapter.hpp"
 #include "implicit.hpp"
 #include "numbers.hpp"
 #include "ricochet/detail/guard_view.hpp"
@@ -18,7 +18,7 @@
 namespace ricochet::python {
 
 template <>
-void FormulaDoor<detail::TaylorOf<0>>::choose_method(detail::RunSetup<State>& setup)
+void FormulaAdapter<detail::TaylorOf<0>>::choose_method(detail::RunBindings<State>& setup)
 {
     detail::step_by_series<FormulaSystem, State, 0>(setup);
 }
@@ -29,19 +29,19 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-/// Door of one run to a system of callbacks, with the arrays that its callbacks are shown.
-class CallbackDoor final : public RunDoor {
+/// SystemAdapter of one run to a system of callbacks, with the arrays that its callbacks are shown.
+class CallbackAdapter final : public RunAdapter {
     using Table = detail::SystemTable<State>;
     using Guards = std::vector<CallbackGuard>;
 
 public:
-    explicit CallbackDoor(const CallbackSource& source)
+    explicit CallbackAdapter(const CallbackSource& source)
         : source_(source), x_(source.as_list_), dxdt_(source.as_list_)
     {
     }
 
     [[nodiscard]] const Table& table() const noexcept override { return source_.table_; }
-    [[nodiscard]] void* door() noexcept override { return this; }
+    [[nodiscard]] void* adapter() noexcept override { return this; }
     [[nodiscard]] bool is_free() const noexcept override { return source_.free_; }
     [[nodiscard]] bool has_inclusion() const noexcept override
     {
@@ -66,12 +66,12 @@ public:
     static void fill(Table& table, const CallbackSource& source)
     {
         table.moded = source.moded_;
-        table.flow = [](void* door, Mode mode, double t, const State& x, State& dxdt) {
-            return at(door).flow(mode, t, x, dxdt);
+        table.flow = [](void* adapter, Mode mode, double t, const State& x, State& dxdt) {
+            return at(adapter).flow(mode, t, x, dxdt);
         };
-        table.mode_count = [](void* door) { return at(door).source_.mode_count_; };
-        table.guard_count = [](void* door) { return at(door).source_.guards_.size(); };
-        table.name = [](void* door) { return at(door).name(); };
+        table.mode_count = [](void* adapter) { return at(adapter).source_.mode_count_; };
+        table.guard_count = [](void* adapter) { return at(adapter).source_.guards_.size(); };
+        table.name = [](void* adapter) { return at(adapter).name(); };
         fill_time_events(table, source);
         const Guards& guards = source.guards_;
         if (guards.empty()) return;
@@ -103,34 +103,36 @@ private:
     static void fill_time_events(Table& table, const CallbackSource& source)
     {
         if (source.times_) {
-            table.next_time_event = [](void* door, double t) {
-                return at(door).source_.times_->next(t);
+            table.next_time_event = [](void* adapter, double t) {
+                return at(adapter).source_.times_->next(t);
             };
-            table.previous_time_event = [](void* door, double t) {
-                return at(door).source_.times_->previous(t);
+            table.previous_time_event = [](void* adapter, double t) {
+                return at(adapter).source_.times_->previous(t);
             };
-            table.time_event_count = [](void* door, double t) {
-                return at(door).source_.times_->count(t);
+            table.time_event_count = [](void* adapter, double t) {
+                return at(adapter).source_.times_->count(t);
             };
         } else if (source.next_time_event_ || source.next_time_event_at_) {
             if (source.next_time_event_at_) {
-                table.next_time_event_at = [](void* door, Mode mode, double t, const State& x) {
-                    return at(door).timer(mode, t, x);
+                table.next_time_event_at = [](void* adapter, Mode mode, double t, const State& x) {
+                    return at(adapter).timer(mode, t, x);
                 };
             } else {
-                table.next_time_event = [](void* door, double t) {
-                    return at(door).time_event(at(door).source_.next_time_event_, t, infinity);
+                table.next_time_event = [](void* adapter, double t) {
+                    return at(adapter).time_event(at(adapter).source_.next_time_event_, t,
+                                                  infinity);
                 };
             }
             if (source.previous_time_event_) {
-                table.previous_time_event = [](void* door, double t) {
-                    return at(door).time_event(at(door).source_.previous_time_event_, t, -infinity);
+                table.previous_time_event = [](void* adapter, double t) {
+                    return at(adapter).time_event(at(adapter).source_.previous_time_event_, t,
+                                                  -infinity);
                 };
             }
         }
         if (source.time_reset_) {
-            table.time_reset = [](void* door, Mode mode, double t, State& x) {
-                return at(door).time_reset(mode, t, x);
+            table.time_reset = [](void* adapter, Mode mode, double t, State& x) {
+                return at(adapter).time_reset(mode, t, x);
             };
         }
     }
@@ -141,24 +143,24 @@ private:
         table.guard_alone = !source.guard_values_;
         table.rated = every(source.guards_, &CallbackGuard::rate);
         table.calls_of_rate = table.rated ? 0 : 2;
-        table.info = [](void* door, std::size_t which) {
-            return at(door).source_.guards_[which].info;
+        table.info = [](void* adapter, std::size_t which) {
+            return at(adapter).source_.guards_[which].info;
         };
-        table.guards = [](void* door, Mode mode, double t, const State& x, std::span<double> g) {
-            at(door).guards(mode, t, x, g);
+        table.guards = [](void* adapter, Mode mode, double t, const State& x, std::span<double> g) {
+            at(adapter).guards(mode, t, x, g);
         };
-        table.guard = [](void* door, std::size_t which, Mode mode, double t, const State& x) {
-            return at(door).guard(which, mode, t, x);
+        table.guard = [](void* adapter, std::size_t which, Mode mode, double t, const State& x) {
+            return at(adapter).guard(which, mode, t, x);
         };
-        table.rate = [](void* door, GuardInMode of, detail::ScaledTime time, const State& x,
-                        const State& dxdt) { return at(door).rate(of, time, x, dxdt); };
+        table.rate = [](void* adapter, GuardInMode of, detail::ScaledTime time, const State& x,
+                        const State& dxdt) { return at(adapter).rate(of, time, x, dxdt); };
         if (table.rated) {
-            table.each_rate = [](void* door, const detail::Along<State>& motion,
+            table.each_rate = [](void* adapter, const detail::Along<State>& motion,
                                  std::span<double> rates) {
                 for (std::size_t i = 0; i < rates.size(); ++i) {
                     rates[i] =
-                        at(door).is_in(i, motion.mode)
-                            ? at(door).closed_rate(i, motion.mode, motion.t, motion.x, motion.s)
+                        at(adapter).is_in(i, motion.mode)
+                            ? at(adapter).closed_rate(i, motion.mode, motion.t, motion.x, motion.s)
                             : 0;
                 }
             };
@@ -169,13 +171,15 @@ private:
     {
         if (std::any_of(guards.begin(), guards.end(),
                         [](const CallbackGuard& guard) { return !guard.in_mode.empty(); })) {
-            table.enabled_in = [](void* door, std::size_t which, Mode mode) {
-                return at(door).is_in(which, mode);
+            table.enabled_in = [](void* adapter, std::size_t which, Mode mode) {
+                return at(adapter).is_in(which, mode);
             };
         }
         if (any(guards, &CallbackGuard::enabled)) {
-            table.enabled_at = [](void* door, std::size_t which, Mode mode, double t,
-                                  const State& x) { return at(door).enabled(which, mode, t, x); };
+            table.enabled_at = [](void* adapter, std::size_t which, Mode mode, double t,
+                                  const State& x) {
+                return at(adapter).enabled(which, mode, t, x);
+            };
         }
     }
 
@@ -183,24 +187,24 @@ private:
     {
         const Guards& guards = source.guards_;
         if (source.reset_set_) {
-            table.reset_set = [](void* door, const FiredGuards& fired, Mode mode, double t,
-                                 State& x) { return at(door).reset_set(fired, mode, t, x); };
+            table.reset_set = [](void* adapter, const FiredGuards& fired, Mode mode, double t,
+                                 State& x) { return at(adapter).reset_set(fired, mode, t, x); };
         } else if (any(guards, &CallbackGuard::reset)) {
-            table.reset = [](void* door, std::size_t which, Mode mode, double t, State& x) {
-                const CallbackGuard& guard = at(door).source_.guards_[which];
-                if (guard.directed) return at(door).reset_by_direction(guard, mode, t, x);
-                return at(door).edit(guard.reset, "reset of ", guard.owner, mode, t, x);
+            table.reset = [](void* adapter, std::size_t which, Mode mode, double t, State& x) {
+                const CallbackGuard& guard = at(adapter).source_.guards_[which];
+                if (guard.directed) return at(adapter).reset_by_direction(guard, mode, t, x);
+                return at(adapter).edit(guard.reset, "reset of ", guard.owner, mode, t, x);
             };
             if (any(guards, &CallbackGuard::directed)) {
-                table.tell_direction = [](void* door, Crossing direction) {
-                    at(door).direction_ = direction;
+                table.tell_direction = [](void* adapter, Crossing direction) {
+                    at(adapter).direction_ = direction;
                 };
             }
         }
         if (any(guards, &CallbackGuard::rest)) {
-            table.rest = [](void* door, std::size_t which, Mode mode, double t, State& x) {
-                const CallbackGuard& guard = at(door).source_.guards_[which];
-                return at(door).edit(guard.rest, "rest of ", guard.owner, mode, t, x, false);
+            table.rest = [](void* adapter, std::size_t which, Mode mode, double t, State& x) {
+                const CallbackGuard& guard = at(adapter).source_.guards_[which];
+                return at(adapter).edit(guard.rest, "rest of ", guard.owner, mode, t, x, false);
             };
         }
     }
@@ -208,8 +212,8 @@ private:
     static void fill_bounds(Table& table, const Guards& guards)
     {
         table.bounded = true;
-        table.lipschitz = [](void* door, std::size_t which) {
-            return at(door).source_.guards_[which].lipschitz;
+        table.lipschitz = [](void* adapter, std::size_t which) {
+            return at(adapter).source_.guards_[which].lipschitz;
         };
         table.speed_bound = &bound<&CallbackGuard::speed_bound>;
         table.acceleration_bound = &bound<&CallbackGuard::acceleration_bound>;
@@ -221,9 +225,9 @@ private:
         }
     }
 
-    [[nodiscard]] static CallbackDoor& at(void* door) noexcept
+    [[nodiscard]] static CallbackAdapter& at(void* adapter) noexcept
     {
-        return *static_cast<CallbackDoor*>(door);
+        return *static_cast<CallbackAdapter*>(adapter);
     }
 
     // --- calls ---
@@ -384,10 +388,10 @@ private:
     }
 
     template <Function CallbackGuard::*member>
-    [[nodiscard]] static double bound(void* door, std::size_t which, Mode mode, double t,
+    [[nodiscard]] static double bound(void* adapter, std::size_t which, Mode mode, double t,
                                       const State& x)
     {
-        const CallbackGuard& guard = at(door).source_.guards_[which];
+        const CallbackGuard& guard = at(adapter).source_.guards_[which];
         const Function& function = guard.*member;
         if (!function) {
             return member == &CallbackGuard::acceleration_bound ? 0
@@ -398,7 +402,7 @@ private:
             return reinterpret_cast<CompiledGuard>(function.address)(mode, t, x.data(), x.size(),
                                                                      function.user);
         }
-        return at(door).number(function, "bound of ", guard.owner, mode, t, x);
+        return at(adapter).number(function, "bound of ", guard.owner, mode, t, x);
     }
 
     // --- resets ---
@@ -580,10 +584,10 @@ private:
 #ifdef RICOCHET_WITH_NONSMOOTH
 
 /// The inclusion of a system in one mode.
-class CallbackDoor::Inclusion final : public detail::SizedInclusion {
+class CallbackAdapter::Inclusion final : public detail::SizedInclusion {
 public:
-    Inclusion(CallbackDoor& door, Mode mode, std::size_t size)
-        : door_(door), of_(*door.source_.inclusion_), mode_(mode), size_(size)
+    Inclusion(CallbackAdapter& adapter, Mode mode, std::size_t size)
+        : adapter_(adapter), of_(*adapter.source_.inclusion_), mode_(mode), size_(size)
     {
     }
 
@@ -591,11 +595,11 @@ public:
     [[nodiscard]] std::size_t reactions() const noexcept override { return of_.reactions; }
     void smooth(double t, const double* w, double* f) const override
     {
-        read(door_.call(of_.smooth, mode_, t, show(w)).get(), "smooth", size_, f);
+        read(adapter_.call(of_.smooth, mode_, t, show(w)).get(), "smooth", size_, f);
     }
     void bounds(double t, const double* w, double* lower, double* upper) const override
     {
-        const Ref result = door_.call(of_.bounds, mode_, t, show(w));
+        const Ref result = adapter_.call(of_.bounds, mode_, t, show(w));
         if (!PyTuple_Check(result.get()) || PyTuple_GET_SIZE(result.get()) != 2) {
             raise(PyExc_TypeError, "bounds of set_valued returned " + type_of(result.get()) +
                                        ", expected a tuple (lower, upper)");
@@ -605,12 +609,12 @@ public:
     }
     void offset(double t, double* s) const override
     {
-        if (of_.offset) read(door_.call(of_.offset, mode_, t).get(), "offset", reactions(), s);
+        if (of_.offset) read(adapter_.call(of_.offset, mode_, t).get(), "offset", reactions(), s);
     }
     void offset_rate(double t, double* rate) const override
     {
         if (of_.offset_rate) {
-            read(door_.call(of_.offset_rate, mode_, t).get(), "offset_rate", reactions(), rate);
+            read(adapter_.call(of_.offset_rate, mode_, t).get(), "offset_rate", reactions(), rate);
         }
     }
     [[nodiscard]] const detail::SizedMatrices& matrices() const noexcept override
@@ -621,8 +625,8 @@ public:
 private:
     [[nodiscard]] PyObject* show(const double* w) const
     {
-        door_.there_.assign(w, w + size_);
-        return door_.x_.show(door_.there_);
+        adapter_.there_.assign(w, w + size_);
+        return adapter_.x_.show(adapter_.there_);
     }
     /// Writes `count` numbers; a number alone is an array of one.
     static void read(PyObject* result, const char* what, std::size_t count, double* out)
@@ -639,14 +643,14 @@ private:
         numbers.copy(out);
     }
 
-    CallbackDoor& door_;
+    CallbackAdapter& adapter_;
     const CallbackInclusion& of_;
     Mode mode_;
     std::size_t size_;
 };
 
-void CallbackDoor::add_inclusions(detail::PhasedSetup<State>& setup, std::size_t n,
-                                  const Options& options)
+void CallbackAdapter::add_inclusions(detail::PhasedSetup<State>& setup, std::size_t n,
+                                     const Options& options)
 {
     const CallbackInclusion& of = *source_.inclusion_;
     if (of.components != 0 && of.components != n) {
@@ -678,20 +682,20 @@ void CallbackDoor::add_inclusions(detail::PhasedSetup<State>& setup, std::size_t
     }
     setup.by_mode = source_.moded_;
     if (of.start_mode) {
-        setup.start_mode = [](void* door, Mode mode, double t, const State& x) {
-            return at(door).mode_after(mode, t, x);
+        setup.start_mode = [](void* adapter, Mode mode, double t, const State& x) {
+            return at(adapter).mode_after(mode, t, x);
         };
     }
     if (of.change) {
-        setup.change = [](void* door, std::size_t reaction, EventKind kind, Mode mode, double t,
-                          State& x) { return at(door).change(reaction, kind, mode, t, x); };
+        setup.change = [](void* adapter, std::size_t reaction, EventKind kind, Mode mode, double t,
+                          State& x) { return at(adapter).change(reaction, kind, mode, t, x); };
     }
 }
 
 #else
 
-void CallbackDoor::add_inclusions(detail::PhasedSetup<State>& /*setup*/, std::size_t /*n*/,
-                                  const Options& /*options*/)
+void CallbackAdapter::add_inclusions(detail::PhasedSetup<State>& /*setup*/, std::size_t /*n*/,
+                                     const Options& /*options*/)
 {
 }
 
@@ -699,10 +703,10 @@ void CallbackDoor::add_inclusions(detail::PhasedSetup<State>& /*setup*/, std::si
 
 void CallbackSource::fill_table()
 {
-    CallbackDoor::fill(table_, *this);
+    CallbackAdapter::fill(table_, *this);
 }
 
-std::unique_ptr<RunDoor> CallbackSource::open(const State& x0) const
+std::unique_ptr<RunAdapter> CallbackSource::open(const State& x0) const
 {
     if (flow_.is_formula) {
         const std::size_t expected =
@@ -712,7 +716,7 @@ std::unique_ptr<RunDoor> CallbackSource::open(const State& x0) const
                                         " components for a formula of " + std::to_string(expected));
         }
     }
-    return std::make_unique<CallbackDoor>(*this);
+    return std::make_unique<CallbackAdapter>(*this);
 }
 
 std::optional<std::vector<const ModedFormula*>> CallbackSource::guard_formulas() const
@@ -725,21 +729,21 @@ std::optional<std::vector<const ModedFormula*>> CallbackSource::guard_formulas()
     return guards;
 }
 
-std::unique_ptr<RunDoor> CallbackSource::open_by_series(const State& x0) const
+std::unique_ptr<RunAdapter> CallbackSource::open_by_series(const State& x0) const
 {
     auto guards = guard_formulas();
     if (!flow_.is_formula || !guards) return Source::open_by_series(x0);
     const auto& flow = *static_cast<const ModedFormula*>(flow_.user);
-    return std::make_unique<FormulaDoor<detail::TaylorOf<0>>>(open(x0), flow, std::move(*guards),
-                                                              x0);
+    return std::make_unique<FormulaAdapter<detail::TaylorOf<0>>>(open(x0), flow, std::move(*guards),
+                                                                 x0);
 }
 
-std::unique_ptr<RunDoor> CallbackSource::open_implicit(const State& x0) const
+std::unique_ptr<RunAdapter> CallbackSource::open_implicit(const State& x0) const
 {
     auto guards = guard_formulas();
-    if (!flow_.is_formula || !guards) return implicit_door(open(x0), x0);
+    if (!flow_.is_formula || !guards) return implicit_adapter(open(x0), x0);
     const auto& flow = *static_cast<const ModedFormula*>(flow_.user);
-    return implicit_formula_door(open(x0), flow, std::move(*guards), x0);
+    return implicit_formula_adapter(open(x0), flow, std::move(*guards), x0);
 }
 
 }  // namespace ricochet::python

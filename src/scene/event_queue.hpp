@@ -12,9 +12,9 @@
 
 namespace ricochet::detail {
 
-class Calendar {
+class EventQueue {
 public:
-    explicit Calendar(std::size_t bodies) : place_(bodies, none) {}
+    explicit EventQueue(std::size_t bodies) : place_(bodies, none) {}
 
     /// Removes all entries; with a ring if there will be many.
     void clear(bool with_ring)

@@ -9,14 +9,14 @@ namespace ricochet::detail {
 
 /// Forwards every question to `Exact`.
 template <class Exact>
-class Around {
+class WrappedDetector {
 public:
     static constexpr bool uses_rates = Exact::uses_rates;
     static constexpr Screening screening = screening_of<Exact>;
     static constexpr bool checks_inside = ChecksInside<Exact>;
     static constexpr Evidence evidence = Exact::evidence;  ///< about a step it has examined
 
-    explicit Around(const Exact& exact) : exact_(exact) {}
+    explicit WrappedDetector(const Exact& exact) : exact_(exact) {}
 
     [[nodiscard]] static constexpr bool suspects(double sign, const GuardSample& start,
                                                  const GuardSample& end) noexcept

@@ -2,11 +2,11 @@
 #include <algorithm>
 #include <cmath>
 
-#include "scene/runner.hpp"
+#include "scene/scene_loop.hpp"
 
 namespace ricochet::detail {
 
-std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
+std::vector<std::uint32_t> SceneLoop::touching_faces(std::uint32_t i) const
 {
     const Body& body = world_.bodies[i];
     std::vector<std::uint32_t> faces;
@@ -32,7 +32,7 @@ std::vector<std::uint32_t> Runner::touching_faces(std::uint32_t i) const
 
 /// Keeps a body whose bounces are shorter than the time resolves on its surfaces: at rest, or
 /// sliding on one of them. `was` is the face on which it slid before.
-void Runner::settle(std::uint32_t i, std::uint32_t was)
+void SceneLoop::settle(std::uint32_t i, std::uint32_t was)
 {
     Body& body = world_.bodies[i];
     const Vector2 velocity = body.v;
@@ -102,7 +102,7 @@ void Runner::settle(std::uint32_t i, std::uint32_t was)
 }
 
 /// In a corner friction stops a disc from turning.
-void Runner::stop_turning(std::uint32_t i, const std::vector<std::uint32_t>& faces)
+void SceneLoop::stop_turning(std::uint32_t i, const std::vector<std::uint32_t>& faces)
 {
     const Body& body = world_.bodies[i];
     const bool rubs = std::ranges::any_of(faces, [&](std::uint32_t f) {
@@ -112,7 +112,7 @@ void Runner::stop_turning(std::uint32_t i, const std::vector<std::uint32_t>& fac
 }
 
 /// Whether surfaces alone hold, from now on, a body that presses on one of them.
-bool Runner::rests_on_face(std::uint32_t i)
+bool SceneLoop::rests_on_face(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
     if (body.island != none || body.contact != none) return false;
@@ -131,7 +131,7 @@ bool Runner::rests_on_face(std::uint32_t i)
 }
 
 /// [s] Time until a disc that turns does not slip any more on the face that holds it.
-double Runner::slips_for(std::uint32_t i) const
+double SceneLoop::slips_for(std::uint32_t i) const
 {
     const Body& body = world_.bodies[i];
     const World::Turn& turn = world_.turns[i];
@@ -144,7 +144,7 @@ double Runner::slips_for(std::uint32_t i) const
 }
 
 /// Predicts the times when friction stops a sliding body, or when its face ends.
-void Runner::consider_own(std::uint32_t i)
+void SceneLoop::consider_own(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
     if (body.held == none) return;
@@ -173,7 +173,7 @@ void Runner::consider_own(std::uint32_t i)
     }
 }
 
-void Runner::halt(std::uint32_t i)
+void SceneLoop::halt(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
     const Vector2 velocity = speed(body, seconds(body.t, now_));
@@ -191,7 +191,7 @@ void Runner::halt(std::uint32_t i)
     predict(i);
 }
 
-void Runner::leave_edge(std::uint32_t i)
+void SceneLoop::leave_edge(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
     const Vector2 velocity = speed(body, seconds(body.t, now_));
@@ -215,7 +215,7 @@ void Runner::leave_edge(std::uint32_t i)
     predict(i);
 }
 
-void Runner::settle_at_start()
+void SceneLoop::settle_at_start()
 {
     for (const std::uint32_t i : members_) {
         Body& body = world_.bodies[i];
@@ -236,13 +236,13 @@ void Runner::settle_at_start()
 }
 
 /// Counts a hold that no impact has led to. What holds at the start is no event.
-void Runner::count_held()
+void SceneLoop::count_held()
 {
     if (before(Instant{world_.options.t_start, 0}, now_)) ++result_.event_count;
 }
 
-void Runner::note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face,
-                  const Vector2& velocity)
+void SceneLoop::note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face,
+                     const Vector2& velocity)
 {
     if (before(Instant{world_.options.t_start, 0}, now_) && world_.options.record_events) {
         SceneEvent event{.t = now_.value, .number = result_.event_count, .kind = kind, .body = i};

@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "ricochet/detail/door.hpp"
 #include "ricochet/detail/scalar_probe.hpp"
+#include "ricochet/detail/system_adapter.hpp"
 #include "ricochet/system.hpp"
 #include "ricochet/taylor/detail/lazy_tape.hpp"
 #include "ricochet/taylor/detail/taylor_series.hpp"
@@ -131,14 +131,14 @@ struct TaylorSizes<System, X, 0> {
     };
 };
 
-/// A door with the operations of the flow and the current step.
+/// A adapter with the operations of the flow and the current step.
 ///
 /// Operations that the compiler has read are unrolled by it. Where it cannot read them, where there
 /// are too many, or where those of the object differ from those of an object that is constructed by
 /// default, they are recorded here, once for each mode, and executed kind by kind. States in
 /// vectors may have another size in each mode, which is known when the mode is entered.
 template <class System, class X, std::size_t n>
-struct TaylorDoor : Door<System, X> {
+struct TaylorAdapter : SystemAdapter<System, X> {
     using Sizes = TaylorSizes<System, X, n>;
     using Step = typename Sizes::Step;
     using Room = typename Sizes::Room;
@@ -165,7 +165,7 @@ struct TaylorDoor : Door<System, X> {
         return n > 0 ? of_arrays : of_vectors;
     }();
 
-    TaylorDoor(const System& system, const X& like) : Door<System, X>(system, like)
+    TaylorAdapter(const System& system, const X& like) : SystemAdapter<System, X>(system, like)
     {
         if constexpr (is_constant) {
             as_compiled_ = read_all(system, std::make_index_sequence<tapes>{});

@@ -2,12 +2,12 @@
 // flights, too.
 #include <algorithm>
 
-#include "scene/runner.hpp"
+#include "scene/scene_loop.hpp"
 
 namespace ricochet::detail {
 
 /// Whether a body can only fly above the only wall and strike it, with no push along the wall.
-bool Runner::flies_above_one_wall(const Body& body) const
+bool SceneLoop::flies_above_one_wall(const Body& body) const
 {
     if (members_.size() != 1 || world_.faces.size() != 1 || world_.wall_count != 1) return false;
     if (!world_.ordinary) return false;
@@ -22,7 +22,7 @@ bool Runner::flies_above_one_wall(const Body& body) const
 /// Takes a body from the start through its first impact and the bounces after it, with the
 /// arithmetic of `impact` but without a search for contacts. Returns false, with nothing changed,
 /// where anything else may happen.
-bool Runner::bounces_from_start()
+bool SceneLoop::bounces_from_start()
 {
     const std::uint32_t i = members_.front();
     Body& body = world_.bodies[i];
@@ -55,8 +55,8 @@ bool Runner::bounces_from_start()
 
 /// The impact of a body alone on the only wall, with the arithmetic of `Impacts` but without
 /// friction. Nothing where the body may stay on the wall.
-std::optional<Runner::Strike> Runner::strike_on_wall(const Body& body, const Vector2& arrives,
-                                                     const Instant& t) const
+std::optional<SceneLoop::Strike> SceneLoop::strike_on_wall(const Body& body, const Vector2& arrives,
+                                                           const Instant& t) const
 {
     const Face& wall = world_.faces[0];
     const double approach = -dot(arrives, wall.normal);
@@ -73,7 +73,7 @@ std::optional<Runner::Strike> Runner::strike_on_wall(const Body& body, const Vec
 }
 
 /// Counts and records an impact on the only wall at the present time.
-void Runner::record(std::uint32_t i, const Strike& strike)
+void SceneLoop::record(std::uint32_t i, const Strike& strike)
 {
     ++world_.statistics.waves;
     ++world_.statistics.impacts;
@@ -92,7 +92,7 @@ void Runner::record(std::uint32_t i, const Strike& strike)
 
 /// Takes a body with drag, alone with the only wall, through an impact without friction. Returns
 /// false, with nothing changed, where anything else may happen.
-bool Runner::strikes_alone(std::uint32_t i)
+bool SceneLoop::strikes_alone(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
     if (members_.size() != 1 || world_.faces.size() != 1 || world_.wall_count != 1) return false;
@@ -116,7 +116,7 @@ bool Runner::strikes_alone(std::uint32_t i)
 }
 
 /// Whether a body that has just left the only wall strikes it again only after the end of the run.
-bool Runner::flies_past_end(std::uint32_t i) const
+bool SceneLoop::flies_past_end(std::uint32_t i) const
 {
     const Body& body = world_.bodies[i];
     const Vector2& normal = world_.faces[0].normal;
@@ -127,7 +127,7 @@ bool Runner::flies_past_end(std::uint32_t i) const
 /// Bounces a body alone that has just left the only wall: flight after flight, each lasting twice
 /// the time to its top. Times are sums of multiples of a unit, which are exact, and of the
 /// remainder.
-void Runner::bounce(std::uint32_t i)
+void SceneLoop::bounce(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
     if (!flies_above_one_wall(body)) return;

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "scene/calendar.hpp"
 #include "scene/contacts.hpp"
+#include "scene/event_queue.hpp"
 #include "scene/grid.hpp"
 #include "scene/impacts.hpp"
 #include "scene/islands.hpp"
@@ -41,7 +41,7 @@ struct Samples {
 /// A value for each body of a group, in memory for all labels from its first to its last. The value
 /// of a body that is alone is always in the same place in memory.
 template <class Value>
-class OfGroup {
+class PerBody {
 public:
     /// @param members  ascending
     void begin(std::span<const std::uint32_t> members)
@@ -62,9 +62,9 @@ private:
     std::uint32_t first_ = 0;
 };
 
-class Runner {
+class SceneLoop {
 public:
-    Runner(World& world, double t_end);
+    SceneLoop(World& world, double t_end);
 
     /// @param events   the events of this group are appended to it
     /// @param samples  a row for each of the options' sample times, whose bodies of this group are
@@ -249,9 +249,9 @@ private:
     bool celled_ = false;          ///< whether bodies can meet each other
     bool on_terrain_ = false;      ///< whether there is terrain that does not move
     std::vector<Vector2> places_;  ///< of members, while cells are laid
-    Calendar calendar_;
-    OfGroup<Pending> pending_;
-    OfGroup<OnTerrain> terrain_;  ///< where there is any
+    EventQueue calendar_;
+    PerBody<Pending> pending_;
+    PerBody<OnTerrain> terrain_;  ///< where there is any
     struct Work {
         std::uint64_t tests = 0, crossings = 0, events = 0;  ///< at the start of the present count
         std::uint64_t left = 0;                              ///< acts until the next look
@@ -262,11 +262,11 @@ private:
     std::vector<std::uint32_t> islands_;
     Impacts impacts_;
     Contacts contacts_;
-    struct Patience {
+    struct Backoff {
         std::uint32_t steps = 1;
         Instant released{-never, 0};
     };
-    std::vector<Patience> patience_;  ///< of bodies, where there has been lasting contact
+    std::vector<Backoff> patience_;  ///< of bodies, where there has been lasting contact
     Cluster cluster_;
     std::vector<std::uint32_t> changed_;
     std::vector<std::uint32_t> slots_of_islands_;
@@ -281,7 +281,7 @@ private:
         std::uint32_t count = 0;
         std::uint32_t low = 0;  ///< hops in a row that rise by less than rounding
     };
-    OfGroup<Series> series_;  ///< of impacts of a body
+    PerBody<Series> series_;  ///< of impacts of a body
     Instant now_{};
     std::uint32_t unmoved_ = 0;  ///< consecutive predicted impacts that moved nothing
     std::uint64_t idle_ = 0;     ///< consecutive acts at one time

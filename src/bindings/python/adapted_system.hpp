@@ -35,19 +35,19 @@ private:
     PyGILState_STATE state_{};
 };
 
-/// A system at a door of its own, whose functions may be called without the interpreter.
+/// A system at a adapter of its own, whose functions may be called without the interpreter.
 ///
 /// Absent functions have neutral defaults: resets that change nothing, time events that never
 /// come. `guard_info` tells whether a guard has a reset.
-class DoorSystem {
+class AdaptedSystem {
 public:
     static constexpr bool unchecked_names = true;
     using State = python::State;
 
-    DoorSystem(const Source& source, const State& like)
-        : source_(&source), door_(source.open(like)), table_(&door_->table())
+    AdaptedSystem(const Source& source, const State& like)
+        : source_(&source), adapter_(source.open(like)), table_(&adapter_->table())
     {
-        if (door_->has_inclusion()) {
+        if (adapter_->has_inclusion()) {
             throw std::invalid_argument(
                 "set_valued: found set-valued motion, expected none: a network cannot learn from "
                 "it");
@@ -57,7 +57,7 @@ public:
                 "next_time_event: found one that takes the state, expected next_time_event(t) or "
                 "time_events, whose runs a network can learn from");
         }
-        name = table_->name(door_->door());
+        name = table_->name(adapter_->adapter());
     }
 
     std::string name;
@@ -146,8 +146,8 @@ public:
 private:
     using Bound = double (*)(void*, std::size_t, Mode, double, const State&);
 
-    [[nodiscard]] void* at() const noexcept { return door_->door(); }
-    [[nodiscard]] bool needs_interpreter() const noexcept { return !door_->is_free(); }
+    [[nodiscard]] void* at() const noexcept { return adapter_->adapter(); }
+    [[nodiscard]] bool needs_interpreter() const noexcept { return !adapter_->is_free(); }
     [[nodiscard]] double bound(Bound function, std::size_t which, Mode mode, double t,
                                const State& x) const
     {
@@ -156,17 +156,17 @@ private:
     }
 
     const Source* source_;
-    std::unique_ptr<RunDoor> door_;
+    std::unique_ptr<RunAdapter> adapter_;
     const detail::SystemTable<State>* table_;
 };
 
-/// A `DoorSystem` with one guard, for templates that require a single guard at compile time.
+/// A `AdaptedSystem` with one guard, for templates that require a single guard at compile time.
 class SingleGuardSystem {
 public:
     static constexpr bool unchecked_names = true;
     using State = python::State;
 
-    explicit SingleGuardSystem(const DoorSystem& system) : name(system.name), system_(&system) {}
+    explicit SingleGuardSystem(const AdaptedSystem& system) : name(system.name), system_(&system) {}
 
     std::string name;
 
@@ -204,7 +204,7 @@ public:
     }
 
 private:
-    const DoorSystem* system_;
+    const AdaptedSystem* system_;
 };
 
 }  // namespace ricochet::python
