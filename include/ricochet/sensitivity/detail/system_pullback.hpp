@@ -24,9 +24,9 @@
 #include "ricochet/detail/dual_derivatives.hpp"
 #include "ricochet/sensitivity/detail/dual_parameter.hpp"
 #include "ricochet/sensitivity/detail/linearization.hpp"
+#include "ricochet/sensitivity/detail/reverse.hpp"
 #include "ricochet/sensitivity/family.hpp"
 #include "ricochet/sensitivity/pullback.hpp"
-#include "ricochet/sensitivity/reverse.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet {

@@ -1,3 +1,5 @@
+// Internal: the declarations of this header may change without notice.
+//
 // Reverse mode: a scalar that records what is computed with it, and the sweep back through the
 // record.
 //
@@ -82,10 +84,6 @@ private:
     ReverseTape* before_;
 };
 
-}  // namespace ricochet::detail
-
-namespace ricochet {
-
 /// A number whose operations are recorded for a sweep in reverse, as a user's template sees it: it
 /// has the operators and functions of `Dual`, and comparisons compare values.
 struct Reverse {
@@ -106,7 +104,7 @@ struct Reverse {
     requires std::is_same_v<U, double>
     constexpr operator U() const  // NOLINT(google-explicit-constructor)
     {
-        static_assert(detail::is_never_number<U>,
+        static_assert(is_never_number<U>,
                       "ricochet: found a number wanted of a recorded number; expected functions "
                       "called by their bare names (using std::cos; cos(x)) and parameters, time "
                       "and state to have the type of the template parameter");
@@ -242,14 +240,14 @@ private:
     [[nodiscard]] static Reverse of(double value, const Reverse& a, double by_a)
     {
         if (a.entry == 0) return {value, 0};
-        return {value, detail::ReverseTape::current()->add(a.entry, by_a, 0, 0)};
+        return {value, ReverseTape::current()->add(a.entry, by_a, 0, 0)};
     }
     [[nodiscard]] static Reverse of(double value, const Reverse& a, double by_a, const Reverse& b,
                                     double by_b)
     {
         if (a.entry == 0 && b.entry == 0) return {value, 0};
-        return {value, detail::ReverseTape::current()->add(a.entry, by_a, b.entry, by_b)};
+        return {value, ReverseTape::current()->add(a.entry, by_a, b.entry, by_b)};
     }
 };
 
-}  // namespace ricochet
+}  // namespace ricochet::detail
