@@ -5,7 +5,7 @@
                                           or 2.12 with NumPy 2) as well, and no network
 
 The metadata is in pyproject.toml, except for what setuptools of Debian 12 would refuse there. CMAKE_ARGS has further
-options of CMake: -DRICOCHET_LEARN=ON adds training.
+options of CMake: -DRICOCHET_LEARN=ON adds training, -DRICOCHET_SENSITIVITY=ON gradients.
 """
 
 import importlib.util
@@ -64,7 +64,7 @@ class CMakeBuild(build_ext):
         target.parent.mkdir(parents=True, exist_ok=True)
         self.copy_file(str(module), str(target))
         # Where a further part is in the module; FMUs are where what they need is there.
-        for part in ("_scenes", "_learn", "_fmi"):
+        for part in ("_scenes", "_learn", "_gradients", "_fmi"):
             for further in (build / "python" / "ricochet").glob(f"{part}.*"):
                 self.copy_file(str(further), str(target.parent / further.name))
 
