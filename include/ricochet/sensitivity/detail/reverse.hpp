@@ -70,15 +70,15 @@ private:
 };
 
 /// Lets a thread record on a tape while it lives.
-class Recording {
+class ReverseRecording {
 public:
-    explicit Recording(ReverseTape& tape) noexcept : before_(ReverseTape::current())
+    explicit ReverseRecording(ReverseTape& tape) noexcept : before_(ReverseTape::current())
     {
         ReverseTape::current() = &tape;
     }
-    Recording(const Recording&) = delete;
-    Recording& operator=(const Recording&) = delete;
-    ~Recording() { ReverseTape::current() = before_; }
+    ReverseRecording(const ReverseRecording&) = delete;
+    ReverseRecording& operator=(const ReverseRecording&) = delete;
+    ~ReverseRecording() { ReverseTape::current() = before_; }
 
 private:
     ReverseTape* before_;

@@ -291,7 +291,7 @@ private:
     {
         thread_local ReverseTape tape;
         thread_local std::vector<Reverse> parameters;
-        const Recording recording(tape);
+        const ReverseRecording recording(tape);
         tape.shrink(1);
         const auto variable = [](double value) { return Reverse(value, tape.variable()); };
         const std::span<const double> values = source_.values();
