@@ -52,10 +52,12 @@ class Perceptron:
 
     @property
     def inputs(self):
+        """Number of numbers that it takes."""
         return self.layers[0][0].shape[1]
 
     @property
     def outputs(self):
+        """Number of numbers that it gives."""
         return self.layers[-1][1].size
 
     @property
@@ -337,27 +339,42 @@ class Adjoint:
     def __init__(self, recording, run):
         self._recording, self._run = recording, run
 
-    t = property(lambda self: self._run.t)
-    x = property(lambda self: self._run.x)
-    outcome = property(lambda self: self._run.outcome)
-    message = property(lambda self: self._run.message)
-    steps = property(lambda self: self._run.steps)
-    sample_times = property(lambda self: self._run.sample_t)
-    samples = property(lambda self: self._run.samples)
-    event_times = property(lambda self: self._run.event_t)
-    event_kinds = property(lambda self: self._run.event_kind)
-    before = property(lambda self: self._run.before)
-    after = property(lambda self: self._run.after)
-    undefined_at = property(lambda self: self._run.undefined)
-    networks = property(lambda self: tuple(self._recording.networks))
+    t = property(lambda self: self._run.t,
+                 doc="Time [s] at its end.")
+    x = property(lambda self: self._run.x,
+                 doc="The state at its end, shape (n,).")
+    outcome = property(lambda self: self._run.outcome,
+                       doc="How it ended, such as ``reached_end``.")
+    message = property(lambda self: self._run.message,
+                       doc="A sentence on how it ended.")
+    steps = property(lambda self: self._run.steps,
+                     doc="Number of its steps.")
+    sample_times = property(lambda self: self._run.sample_t,
+                            doc="Times [s] of the samples, shape (samples,).")
+    samples = property(lambda self: self._run.samples,
+                       doc="States at the sample times, shape (samples, n).")
+    event_times = property(lambda self: self._run.event_t,
+                           doc="Times [s] of the events, shape (events,).")
+    event_kinds = property(lambda self: self._run.event_kind,
+                           doc="Kinds of the events, shape (events,).")
+    before = property(lambda self: self._run.before,
+                      doc="States before the events, shape (events, n).")
+    after = property(lambda self: self._run.after,
+                     doc="States after the events, shape (events, n).")
+    undefined_at = property(lambda self: self._run.undefined,
+                            doc="None, or the number of the first event without a derivative, the reason, and a sentence.")
+    networks = property(lambda self: tuple(self._recording.networks),
+                        doc="The networks of the system, in the order of their gradients.")
 
     @property
     def mode(self):
+        """The mode at its end."""
         modes = self._recording.modes
         return self._run.mode if modes is None else modes[self._run.mode]
 
     @property
     def event_guards(self):
+        """Names of the guards of the events; None for a time event."""
         names = self._recording.guard_names
         return [None if guard is None else names[guard] for guard in self._run.event_guard]
 

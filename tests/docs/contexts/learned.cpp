@@ -1,4 +1,4 @@
-// Only declarations: types with member templates, which no function can declare.
+// A type with member templates, which no function can declare, as a member of a class.
 #include <array>
 #include <cmath>
 #include <ricochet/nn/guard_network.hpp>
@@ -8,8 +8,11 @@ using namespace ricochet;
 
 namespace {
 // clang-format off
+struct Page
 BLOCK
+;
 // clang-format on
+using Ball = Page::Ball;
 
 /// The plane y = 0.
 Model plane()
