@@ -119,14 +119,15 @@ struct PackedFile {
     std::string name, bytes;
 };
 
-/// Writes a zip archive, the same bytes for the same files.
+/// Writes a zip archive, the same bytes for the same files; what was there stays until it is whole.
 void pack(const fs::path& to, std::span<const PackedFile> files)
 {
-    zipFile archive = zipOpen64(to.c_str(), APPEND_STATUS_CREATE);
+    const fs::path part = to.string() + ".part";
+    zipFile archive = zipOpen64(part.c_str(), APPEND_STATUS_CREATE);
     const auto fail = [&] {
         if (archive) zipClose(archive, nullptr);
         std::error_code ignored;
-        fs::remove(to, ignored);
+        fs::remove(part, ignored);
         throw Error(fmt::format("{}: cannot be written", to.string()));
     };
     if (!archive) fail();
@@ -143,6 +144,9 @@ void pack(const fs::path& to, std::span<const PackedFile> files)
         if (!written) fail();
     }
     if (zipClose(std::exchange(archive, nullptr), nullptr) != ZIP_OK) fail();
+    std::error_code error;
+    fs::rename(part, to, error);
+    if (error) fail();
 }
 
 }  // namespace

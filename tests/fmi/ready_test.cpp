@@ -2,6 +2,7 @@
 #include "ricochet/fmi/ready.hpp"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -24,7 +25,8 @@ namespace fs = std::filesystem;
 class Temporary {
 public:
     explicit Temporary(const std::string& name)
-        : path(fs::temp_directory_path() / ("ricochet_ready_" + name + ".fmu"))
+        : path(fs::temp_directory_path() /
+               ("ricochet_ready_" + name + '_' + std::to_string(getpid()) + ".fmu"))
     {
     }
     ~Temporary()
@@ -122,6 +124,16 @@ TEST_P(Ready, TheModeAtTheStartFollowsFromTheStateThere)
     ASSERT_EQ(run.end, End::reached_end) << describe(run);
     EXPECT_EQ(run.last("position"), 0.2);
     EXPECT_EQ(run.last("events"), 0);
+}
+
+TEST(ReadyFmus, TakeThePlaceOfALinkAndNotOfWhatItLeadsTo)
+{
+    const Temporary kept("kept"), link("link");
+    export_ready({.system = "pendulum"}, kept.path);
+    fs::create_symlink(kept.path, link.path);
+    export_ready({.system = "thermostat"}, link.path);
+    EXPECT_EQ(Fmu(kept.path).description().model_name, "pendulum");
+    EXPECT_EQ(Fmu(link.path).description().model_name, "thermostat");
 }
 
 TEST(ReadyFmus, AreTheSameBytesEveryTime)
