@@ -40,6 +40,31 @@ function(ricochet_small_parts)
 endfunction()
 cmake_language(DEFER CALL ricochet_small_parts)
 
+# The same for sources of other libraries that read, describe and set up.
+function(ricochet_small_sources)
+    set(ricochet_scene_small explain.cpp json.cpp measure.cpp scene.cpp simulate.cpp)
+    set(ricochet_small
+        bouncing_ball.cpp buck_converter.cpp coulomb_oscillator.cpp impact_oscillator.cpp outcome.cpp pendulum.cpp
+        model_metadata.cpp safetensors.cpp self_test.cpp snapshot.cpp stick_slip.cpp thermostat.cpp)
+    set(ricochet_python_small filippov.cpp gates.cpp implicit.cpp numbers.cpp)
+    foreach(target IN ITEMS ricochet ricochet_scene ricochet_python)
+        if(NOT TARGET ${target})
+            continue()
+        endif()
+        get_target_property(sources ${target} SOURCES)
+        get_target_property(folder ${target} SOURCE_DIR)
+        foreach(source IN LISTS sources)
+            cmake_path(GET source FILENAME name)
+            if(name IN_LIST ${target}_small)
+                cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${folder})
+                set_source_files_properties(${source} TARGET_DIRECTORY ${target} PROPERTIES
+                    COMPILE_OPTIONS -Os SKIP_UNITY_BUILD_INCLUSION ON SKIP_PRECOMPILE_HEADERS ON)
+            endif()
+        endforeach()
+    endforeach()
+endfunction()
+cmake_language(DEFER CALL ricochet_small_sources)
+
 # Mechanisms with contacts are not in Python, and the solvers of their sizes take long to compile.
 function(ricochet_unused_parts)
     if(TARGET ricochet_fixed_sizes)
