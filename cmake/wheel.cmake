@@ -42,11 +42,11 @@ cmake_language(DEFER CALL ricochet_small_parts)
 
 # The same for sources of other libraries that read, describe and set up.
 function(ricochet_small_sources)
-    set(ricochet_scene_small explain.cpp json.cpp measure.cpp scene.cpp simulate.cpp)
+    set(ricochet_scene_small chains.cpp explain.cpp json.cpp measure.cpp scene.cpp sides.cpp simulate.cpp world.cpp)
     set(ricochet_small
         bouncing_ball.cpp buck_converter.cpp coulomb_oscillator.cpp impact_oscillator.cpp outcome.cpp pendulum.cpp
         model_metadata.cpp safetensors.cpp self_test.cpp snapshot.cpp stick_slip.cpp thermostat.cpp)
-    set(ricochet_python_small filippov.cpp gates.cpp implicit.cpp numbers.cpp)
+    set(ricochet_python_small callbacks.cpp ensemble.cpp filippov.cpp gates.cpp implicit.cpp numbers.cpp)
     foreach(target IN ITEMS ricochet ricochet_scene ricochet_python)
         if(NOT TARGET ${target})
             continue()

@@ -20,7 +20,7 @@ from pathlib import Path
 #: What the sources of a distribution are made of; a copy, so that nothing is left in the source tree.
 TREE = ("CMakeLists.txt", "LICENSE", "LICENSE-THIRD-PARTY", "MANIFEST.in", "README.md", "cmake", "docs", "examples", "include",
         "models", "pyproject.toml", "python", "setup.py", "src", "tests")
-MOST_BYTES = 2_600_000
+MOST_BYTES = 2_650_000  # what it weighs with all that scenes have, and a hundredth more; the aim is 2 MB
 MOST_SYMBOLS = 100
 
 
