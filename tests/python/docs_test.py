@@ -31,6 +31,8 @@ def test_blocks_of_the_page_run(page, least, tmp_path, monkeypatch):
             pytest.skip("a build without FMI")
         (tmp_path / "ball.fmu").symlink_to(ball)
         monkeypatch.chdir(tmp_path)
+    if page == "docs/derivatives.md" and not find_spec("ricochet._gradients"):
+        pytest.skip("a build without gradients")
     names = {}
     for block in blocks:
         for missing in ("numba", "cffi", "matplotlib", "scipy", "torch"):
@@ -45,6 +47,8 @@ def test_blocks_of_the_page_run(page, least, tmp_path, monkeypatch):
                          ids=lambda path: path.stem)
 def test_examples_draw_their_picture(script, tmp_path):
     pytest.importorskip("matplotlib")
+    if "ricochet.sensitivities" in script.read_text() and not find_spec("ricochet._gradients"):
+        pytest.skip("a build without gradients")
     picture = tmp_path / "picture.svg"
     subprocess.run([sys.executable, str(script), str(picture)], check=True, timeout=60)
     assert picture.stat().st_size > 5000

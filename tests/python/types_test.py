@@ -53,8 +53,8 @@ def test_stubs_are_those_of_the_package(mypy, tmp_path):
 
 def test_the_stubs_of_ready_systems_are_what_their_script_prints():
     source = os.environ.get("RICOCHET_SOURCE")
-    if not source:
-        pytest.skip("RICOCHET_SOURCE is not set")
+    if not source or not (Path(source) / "scripts" / "ready_stubs").exists():
+        pytest.skip("RICOCHET_SOURCE has no scripts/ready_stubs")
     package = Path(ricochet.__file__).parent
     environment = dict(os.environ, PYTHONPATH=str(package.parent))
     out = subprocess.run([sys.executable, str(Path(source) / "scripts" / "ready_stubs")],
