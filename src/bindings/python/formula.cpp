@@ -1,9 +1,8 @@
 #include "formula.hpp"
 
 #include <algorithm>
-#include <array>
+#include <span>
 #include <stdexcept>
-#include <string_view>
 #include <tuple>
 #include <utility>
 
@@ -11,11 +10,9 @@ namespace ricochet::python {
 
 namespace {
 
-/// Names of the operations, in the order of `FormulaCode`.
-constexpr std::array<std::string_view, 24> names{
-    "component", "time",  "constant", "add",  "subtract", "multiply", "divide", "power",
-    "atan2",     "hypot", "negate",   "sqrt", "cbrt",     "exp",      "log",    "sin",
-    "cos",       "tan",   "asin",     "acos", "atan",     "sinh",     "cosh",   "tanh"};
+/// Operations of formulas without parameters and networks.
+constexpr auto plain =
+    std::span(formula_names).first<static_cast<std::size_t>(FormulaCode::tanh) + 1>();
 
 }  // namespace
 
@@ -25,11 +22,11 @@ Formula::Formula(std::size_t components,
     : components_(components), outputs_(std::move(outputs))
 {
     for (const auto& [name, a, b, value] : ops) {
-        const auto found = std::find(names.begin(), names.end(), name);
-        if (found == names.end()) {
+        const auto found = std::ranges::find(plain, name);
+        if (found == plain.end()) {
             throw std::invalid_argument("formula: found no operation '" + name + "'");
         }
-        const auto code = static_cast<FormulaCode>(found - names.begin());
+        const auto code = static_cast<FormulaCode>(found - plain.begin());
         const bool is_leaf = code <= FormulaCode::constant;
         const std::size_t before = code == FormulaCode::component ? components
                                    : is_leaf                      ? 1

@@ -2,41 +2,15 @@
 // without Python.
 #pragma once
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <tuple>
 #include <vector>
 
-namespace ricochet::python {
+#include "formula_code.hpp"
 
-enum class FormulaCode : std::uint8_t {
-    component,  ///< component number a of the state
-    time,
-    constant,
-    add,
-    subtract,
-    multiply,
-    divide,
-    power,
-    atan2,
-    hypot,
-    negate,
-    sqrt,
-    cbrt,
-    exp,
-    log,
-    sin,
-    cos,
-    tan,
-    asin,
-    acos,
-    atan,
-    sinh,
-    cosh,
-    tanh,
-};
+namespace ricochet::python {
 
 /// An operation on results of operations before it.
 struct FormulaOp {
@@ -72,37 +46,10 @@ private:
     [[nodiscard]] static S result(const FormulaOp& op, const S& t, const Xs& x,
                                   const std::vector<S>& values)
     {
-        using std::sin, std::cos, std::tan, std::asin, std::acos, std::atan, std::atan2;
-        using std::sinh, std::cosh, std::tanh;
-        using std::sqrt, std::cbrt, std::exp, std::log, std::pow, std::hypot;
         if (op.code == FormulaCode::component) return x[op.a];
         if (op.code == FormulaCode::time) return t;
         if (op.code == FormulaCode::constant) return S(op.value);
-        const S& a = values[op.a];
-        const S& b = values[op.b];
-        switch (op.code) {
-            case FormulaCode::add: return a + b;
-            case FormulaCode::subtract: return a - b;
-            case FormulaCode::multiply: return a * b;
-            case FormulaCode::divide: return a / b;
-            case FormulaCode::power: return pow(a, b);
-            case FormulaCode::atan2: return atan2(a, b);
-            case FormulaCode::hypot: return hypot(a, b);
-            case FormulaCode::negate: return -a;
-            case FormulaCode::sqrt: return sqrt(a);
-            case FormulaCode::cbrt: return cbrt(a);
-            case FormulaCode::exp: return exp(a);
-            case FormulaCode::log: return log(a);
-            case FormulaCode::sin: return sin(a);
-            case FormulaCode::cos: return cos(a);
-            case FormulaCode::tan: return tan(a);
-            case FormulaCode::asin: return asin(a);
-            case FormulaCode::acos: return acos(a);
-            case FormulaCode::atan: return atan(a);
-            case FormulaCode::sinh: return sinh(a);
-            case FormulaCode::cosh: return cosh(a);
-            default: return tanh(a);
-        }
+        return apply(op.code, values[op.a], values[op.b]);
     }
 
     std::size_t components_;

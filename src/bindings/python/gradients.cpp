@@ -5,7 +5,6 @@
 #include <pybind11/stl.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <complex>
 #include <cstddef>
@@ -16,12 +15,12 @@
 #include <span>
 #include <stdexcept>
 #include <string>
-#include <string_view>
 #include <tuple>
 #include <utility>
 #include <vector>
 
 #include "arrays.hpp"
+#include "formula_code.hpp"
 #include "ricochet/sensitivity/adjoint.hpp"
 #include "ricochet/sensitivity/network.hpp"
 
@@ -60,40 +59,7 @@ public:
     virtual void back(const Point& at, const double* weights, const Cotangent& to) const = 0;
 };
 
-enum class Code : std::uint8_t {
-    component,
-    time,
-    parameter,
-    constant,
-    add,
-    subtract,
-    multiply,
-    divide,
-    power,
-    atan2,
-    hypot,
-    negate,
-    sqrt,
-    cbrt,
-    exp,
-    log,
-    sin,
-    cos,
-    tan,
-    asin,
-    acos,
-    atan,
-    sinh,
-    cosh,
-    tanh,
-    network,  ///< number a, whose inputs begin at b in the list of operands
-    output,   ///< number b of the network's evaluation a
-};
-constexpr std::array<std::string_view, 27> code_names{
-    "component", "time",  "parameter", "constant", "add",     "subtract", "multiply",
-    "divide",    "power", "atan2",     "hypot",    "negate",  "sqrt",     "cbrt",
-    "exp",       "log",   "sin",       "cos",      "tan",     "asin",     "acos",
-    "atan",      "sinh",  "cosh",      "tanh",     "network", "output"};
+using Code = FormulaCode;
 
 /// A network and the place of its first parameter.
 struct PlacedNetwork {
@@ -141,11 +107,11 @@ public:
         : operands_(std::move(operands)), results_(std::move(results))
     {
         for (const auto& [name, a, b, value] : ops) {
-            const auto found = std::ranges::find(code_names, name);
-            if (found == code_names.end()) {
+            const auto found = std::ranges::find(formula_names, name);
+            if (found == formula_names.end()) {
                 throw std::invalid_argument("formula: found no operation '" + name + "'");
             }
-            ops_.push_back({static_cast<Code>(found - code_names.begin()), a, b, value});
+            ops_.push_back({static_cast<Code>(found - formula_names.begin()), a, b, value});
         }
     }
 
@@ -202,7 +168,7 @@ private:
                     break;
                 }
                 case Code::output: break;
-                default: v[i] = result(op.code, v[op.a], v[op.b]);
+                default: v[i] = apply(op.code, v[op.a], v[op.b]);
             }
         }
         return v;
@@ -213,33 +179,6 @@ private:
     {
         in.resize(n);
         for (std::size_t k = 0; k < n; ++k) in[k] = v[operands_[op.b + k]];
-    }
-
-    [[nodiscard]] static double result(Code code, double a, double b)
-    {
-        switch (code) {
-            case Code::add: return a + b;
-            case Code::subtract: return a - b;
-            case Code::multiply: return a * b;
-            case Code::divide: return a / b;
-            case Code::power: return std::pow(a, b);
-            case Code::atan2: return std::atan2(a, b);
-            case Code::hypot: return std::hypot(a, b);
-            case Code::negate: return -a;
-            case Code::sqrt: return std::sqrt(a);
-            case Code::cbrt: return std::cbrt(a);
-            case Code::exp: return std::exp(a);
-            case Code::log: return std::log(a);
-            case Code::sin: return std::sin(a);
-            case Code::cos: return std::cos(a);
-            case Code::tan: return std::tan(a);
-            case Code::asin: return std::asin(a);
-            case Code::acos: return std::acos(a);
-            case Code::atan: return std::atan(a);
-            case Code::sinh: return std::sinh(a);
-            case Code::cosh: return std::cosh(a);
-            default: return std::tanh(a);
-        }
     }
 
     void back_through(const Each& op, std::size_t i, const std::vector<double>& v,
