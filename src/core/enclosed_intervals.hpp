@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "core/guard_bank.hpp"
+#include "core/guard_table.hpp"
 #include "core/step.hpp"
 #include "core/tentative_steps.hpp"
 #include "core/tolerances.hpp"

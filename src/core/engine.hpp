@@ -25,8 +25,8 @@
 #include <vector>
 
 #include "core/event_search.hpp"
-#include "core/guard_bank.hpp"
 #include "core/guard_life.hpp"
+#include "core/guard_table.hpp"
 #include "core/merged_resets.hpp"
 #include "core/metering.hpp"
 #include "core/planner.hpp"
@@ -83,8 +83,8 @@ protected:
           resolution_(options),
           backward_(options.t_end < options.t_start),
           step_(system_, *setup.kernel, x0, options),
-          bank_(system_, BankRules::of(setup.detector, system_), backward_),
-          search_(system_, x0, bank_.size(), finders_, options_),
+          guards_(system_, GuardRules::of(setup.detector, system_), backward_),
+          search_(system_, x0, guards_.size(), finders_, options_),
           resets_(x0),
           left_rate_(x0),
           left_start_(x0),
@@ -94,7 +94,7 @@ protected:
         may_be_on_series_ = !defers_ && !predicts_ &&
                             (screening == Screening::extremum || screening == Screening::every);
         on_series_ = may_be_on_series_ && step_.has_guard_series();
-        if (defers_) planner_.emplace(system_, finders_, x0, backward_, bank_.size());
+        if (defers_) planner_.emplace(system_, finders_, x0, backward_, guards_.size());
     }
 
     // --- set-up ---
@@ -178,9 +178,9 @@ protected:
                                                      std::size_t i) noexcept
     {
         end(Outcome::non_finite, i);
-        const bool has_guard = i < bank_.size();
+        const bool has_guard = i < guards_.size();
         run_.reason = reason_not_finite(
-            function, i, has_guard ? std::string_view(bank_[i].info.name) : std::string_view());
+            function, i, has_guard ? std::string_view(guards_[i].info.name) : std::string_view());
     }
 
     /// Forgets what ended a run before.
@@ -239,7 +239,7 @@ protected:
     /// Begins the first set of an instant.
     void begin_set() noexcept
     {
-        bank_.take_bands();
+        guards_.take_tolerances();
         first_set_ = true;
     }
     /// Applies a time event, or a change located by the stepper, after other sets of the same
@@ -263,11 +263,11 @@ protected:
     /// the step as well, and a second time if the first evaluation leaves doubts.
     [[nodiscard]] bool any_suspicious()
     {
-        if (bank_.on_series() || !bank_.checks_inside() || !options_.check_inside)
-            return bank_.suspicious(step_.h());
-        if (step_.is_hosts_cubic() && bank_.clear_as_cubics(step_.h())) return false;
+        if (guards_.on_series() || !guards_.checks_inside() || !options_.check_inside)
+            return guards_.suspicious(step_.h());
+        if (step_.is_hosts_cubic() && guards_.clear_as_cubics(step_.h())) return false;
         check_inside();
-        const bool signs = bank_.has_signs() && search_.checks_signs_closely(step_.h());
+        const bool signs = guards_.has_signs() && search_.checks_signs_closely(step_.h());
         return is_suspicious(signs || (error_controlled_ && hardly_moves()));
     }
 
@@ -278,10 +278,10 @@ protected:
     /// Guards with power series need no rates until a search asks for them.
     void sample_end()
     {
-        if (!on_series_) return bank_.sample_end(step_, calls());
-        bank_.sample_values_at_end(step_, calls());
-        bank_.see_series(step_);
-        if (!bank_.on_series()) bank_.complete_rates(step_, calls());
+        if (!on_series_) return guards_.sample_end(step_, calls());
+        guards_.sample_values_at_end(step_, calls());
+        guards_.see_series(step_);
+        if (!guards_.on_series()) guards_.complete_rates(step_, calls());
     }
 
     void check_inside();
@@ -294,7 +294,7 @@ protected:
 
     [[nodiscard]] Evidence evidence_of_clear() const noexcept
     {
-        return bank_.on_series() ? Evidence::proved : finders_.detector.evidence;
+        return guards_.on_series() ? Evidence::proved : finders_.detector.evidence;
     }
 
     [[nodiscard]] Evidence evidence_of_quiet() const noexcept
@@ -305,7 +305,7 @@ protected:
     void pass_on_clear() noexcept
     {
         run_.statistics.evidence.add(evidence_of_clear());
-        bank_.pass_on();
+        guards_.pass_on();
     }
 
     // --- ties ---
@@ -360,8 +360,8 @@ protected:
 
     [[gnu::noinline]] void end_plateaus()
     {
-        for (std::size_t i = 0; i < bank_.size(); ++i) {
-            if (bank_.leaves_plateau(i)) search_.end_plateau(step_, bank_, i, calls());
+        for (std::size_t i = 0; i < guards_.size(); ++i) {
+            if (guards_.leaves_plateau(i)) search_.end_plateau(step_, guards_, i, calls());
         }
     }
 
@@ -382,14 +382,14 @@ protected:
     /// been on its other side in between repeats nothing, unless the two cannot be told apart.
     [[nodiscard]] bool repeats(std::size_t i, double t) const noexcept
     {
-        const GuardRecord& record = bank_[i];
+        const GuardRecord& record = guards_[i];
         const double reach = record.returned ? resolution_.blur(t) : resolution_.window(t);
         return record.side == record.last_side && std::fabs(t - record.last) <= reach;
     }
 
     [[nodiscard]] bool turned_back(std::size_t i) const noexcept
     {
-        return resets_any_ && bank_[i].info.resets && bank_[i].turned;
+        return resets_any_ && guards_[i].info.resets && guards_[i].turned;
     }
 
     /// Whether a guard of a set still has its event where another reset has been applied first.
@@ -402,7 +402,7 @@ protected:
         /// Guards that fire at the start of a step have been armed beyond.
         [[nodiscard]] Crossing direction(std::size_t i) const noexcept
         {
-            const GuardRecord& record = std::as_const(engine.bank_)[i];
+            const GuardRecord& record = std::as_const(engine.guards_)[i];
             if (record.info.crossing != Crossing::either) return record.info.crossing;
             const Side left = located ? record.side : opposite(record.side);
             return left == Side::below ? Crossing::rising : Crossing::falling;
@@ -422,7 +422,7 @@ protected:
     void transform(bool on_time, bool located)
     {
         const double t = on_time ? time_event_ : time_of_set();
-        resets_.apply(system_, bank_, {search_.fired().span(), on_time, step_.mode(), t},
+        resets_.apply(system_, guards_, {search_.fired().span(), on_time, step_.mode(), t},
                       search_.before(), Stands{*this, t, located});
         if (phases_) decide(on_time, t);
     }
@@ -431,12 +431,12 @@ protected:
     /// is known of a guard that jumps.
     [[nodiscard]] bool still_moves(std::size_t i, Mode mode, const Stands& at, const X& x)
     {
-        if (!at.knows_flow() || bank_[i].info.boolean) return true;
+        if (!at.knows_flow() || guards_[i].info.boolean) return true;
         if (at.located && search_.where(i).jump) return true;
         X rate = x;
         step_.flow_in(mode, at.t, x, rate);
-        const Side left = at.located ? bank_[i].side : opposite(bank_[i].side);
-        return sign_of(left) * bank_.view(i, mode, calls()).rate(at.t, x, rate, step_.h()) < 0;
+        const Side left = at.located ? guards_[i].side : opposite(guards_[i].side);
+        return sign_of(left) * guards_.view(i, mode, calls()).rate(at.t, x, rate, step_.h()) < 0;
     }
 
     /// Whether the event changes nothing, and no host asks for such cuts, so that the step can
@@ -480,7 +480,7 @@ protected:
     /// Samples all guards at the start of the current step, in which every guard is examined.
     void watch_all()
     {
-        if (!watching_) bank_.wake_all(step_, last_h_, calls(), newly_armed_);
+        if (!watching_) guards_.wake_all(step_, last_h_, calls(), newly_armed_);
         watching_ = newly_armed_ = true;
         planner_->review(run_.statistics);
     }
@@ -489,7 +489,7 @@ protected:
     void begin_plan()
     {
         newly_armed_ = watching_ = false;
-        planner_->begin(step_, bank_);
+        planner_->begin(step_, guards_);
     }
 
     /// Whether one of the guards in doubt needs a search in the current step. Those that their
@@ -524,12 +524,12 @@ protected:
 
     /// Distance from its surface that a guard that has just fired may have. A guard with declared
     /// bounds may be expensive, and the distance is then taken from its location.
-    void find_band(std::size_t i, double t);
+    void find_tolerance(std::size_t i, double t);
 
     /// Value |g| at the set, at time t, before its resets.
     [[nodiscard]] double value_at_set(std::size_t i, double t)
     {
-        return std::fabs(bank_.view(i, step_.mode(), calls()).value(t, search_.before()));
+        return std::fabs(guards_.view(i, step_.mode(), calls()).value(t, search_.before()));
     }
 
     [[nodiscard]] double time_of_set() const noexcept { return set_time_; }
@@ -602,14 +602,14 @@ protected:
     [[nodiscard]] bool prolongs_row();
     /// As `prolongs_row`, for guards that fire at the instant of the set before, where rounding
     /// hides that they would have moved away from their surfaces and back.
-    [[nodiscard]] bool prolongs_row_at_once();
+    [[nodiscard]] bool prolongs_row_at_instant();
     /// Records the excursion of guard i that has just ended, `soon` after the last acting instant.
     /// True if the excursion is lost in rounding or has fallen to a thousandth; false if not
     /// `soon`.
     [[nodiscard]] bool falls(std::size_t i, bool soon);
     [[nodiscard]] bool has_excursions(std::size_t i) const noexcept
     {
-        const GuardInfo& info = std::as_const(bank_)[i].info;
+        const GuardInfo& info = std::as_const(guards_)[i].info;
         return !info.boolean && resets_any_ && info.resets;
     }
     /// Notes the slopes and roundings that `falls` needs.
@@ -645,7 +645,7 @@ protected:
     /// be one, is taken over 1e-5 of `scale` [s].
     [[nodiscard]] double departure(std::size_t i, double scale)
     {
-        return bank_.view(i, step_.mode(), calls())
+        return guards_.view(i, step_.mode(), calls())
             .rate(step_.time(0), step_.x0(), step_.rate0(), scale);
     }
 
@@ -657,8 +657,8 @@ protected:
     /// A guard that has come to rest.
     struct Rested {
         std::size_t guard = 0;
-        double band = 0;   ///< |g| where it fired last
-        double ahead = 0;  ///< [s] from there to the limit, for which the state stood still
+        double tolerance = 0;  ///< |g| where it fired last
+        double ahead = 0;      ///< [s] from there to the limit, for which the state stood still
     };
 
     /// Components that stand still since the rest of a guard on whose surface the flow presses.
@@ -787,7 +787,7 @@ protected:
     [[nodiscard]] bool holds_fit(std::size_t n) const noexcept
     {
         return std::all_of(holds_.begin(), holds_.end(), [&](const Hold& hold) {
-            return hold.guard < bank_.size() &&
+            return hold.guard < guards_.size() &&
                    std::all_of(hold.components.begin(), hold.components.end(),
                                [n](std::size_t component) { return component < n; });
         });
@@ -824,8 +824,8 @@ protected:
     void count_armed_beyond(std::size_t i, bool on_surface) noexcept
     {
         ++run_.statistics.armed_beyond;
-        bank_[i].armed_beyond = true;
-        bank_[i].armed_on = on_surface;
+        guards_[i].armed_beyond = true;
+        guards_[i].armed_on = on_surface;
     }
 
     /// Whether guard i has an event recorded at t.
@@ -839,9 +839,9 @@ protected:
     {
         run_.armed_beyond.clear();
         run_.armed_on_surface.clear();
-        for (std::size_t i = 0; i < std::min(bank_.size(), own_guards_); ++i) {
-            if (std::as_const(bank_)[i].armed_on) note_left_start(i);
-            const GuardRecord& record = std::as_const(bank_)[i];
+        for (std::size_t i = 0; i < std::min(guards_.size(), own_guards_); ++i) {
+            if (std::as_const(guards_)[i].armed_on) note_left_start(i);
+            const GuardRecord& record = std::as_const(guards_)[i];
             if (!record.armed_beyond) continue;
             run_.armed_beyond.push_back(i);
             if (record.armed_on) run_.armed_on_surface.push_back(i);
@@ -866,13 +866,13 @@ protected:
     struct Seen {
         Side side = Side::plateau;  ///< on which it lies, or to which it heads from its surface
         bool on = false;            ///< it is on its surface
-        bool set_off = false;       ///< `leaves_at_once`
+        bool set_off = false;       ///< `leaves_here`
     };
     [[nodiscard]] Seen see(std::size_t i, Side before, double widest, bool opens);
     [[nodiscard]] bool is_now_set_off(std::size_t i, Side head)
     {
-        return counts(opposite(head), std::as_const(bank_)[i].info.crossing) &&
-               leaves_at_once(i, head);
+        return counts(opposite(head), std::as_const(guards_)[i].info.crossing) &&
+               leaves_here(i, head);
     }
     [[nodiscard]] unsigned facts_of(const GuardRecord& record, Side from,
                                     const Seen& seen) const noexcept
@@ -889,7 +889,7 @@ protected:
     /// here: the set has changed the mode (or a sign in the state that the guard reads, if it
     /// belongs to the set; or `is_set_in_motion`), and along the flow that was left it did not move
     /// that way. A crossing that merely goes on in another mode is the same event.
-    [[nodiscard]] bool leaves_at_once(std::size_t i, Side side);
+    [[nodiscard]] bool leaves_here(std::size_t i, Side side);
     /// Whether the set may have set guard i in motion, without a change of mode: a time event has
     /// changed the state or the flow, or the resets of other guards have, and guard i stood on its
     /// surface since the start or its last event.
@@ -898,7 +898,7 @@ protected:
     /// current set if it had acted.
     [[nodiscard]] bool is_recorded_with_set(std::size_t i) const noexcept
     {
-        const GuardRecord& record = std::as_const(bank_)[i];
+        const GuardRecord& record = std::as_const(guards_)[i];
         if (record.acting) return false;
         if (!first_set_) return !on_time_ && record.recorded_in + 1 == armings_;
         const double t = step_.time(0);
@@ -907,15 +907,15 @@ protected:
     /// Whether guard i stands on its surface, and no side is known from which it came.
     [[nodiscard]] bool stands(std::size_t i) const noexcept
     {
-        const GuardRecord& record = std::as_const(bank_)[i];
+        const GuardRecord& record = std::as_const(guards_)[i];
         return record.enabled && record.side == Side::plateau && record.awaited == Side::plateau;
     }
     /// Whether any guard stands on its surface without a known side; the reset of another guard may
     /// set it in motion.
     [[nodiscard]] bool any_stands() const noexcept
     {
-        if (single || !bank_.any_stands()) return false;
-        for (std::size_t i = 0; i < bank_.size(); ++i) {
+        if (single || !guards_.any_stands()) return false;
+        for (std::size_t i = 0; i < guards_.size(); ++i) {
             if (stands(i)) return true;
         }
         return false;
@@ -947,7 +947,7 @@ protected:
     /// Whether the rest rule has failed to stop a motion into the surface.
     [[nodiscard]] bool still_stuck(std::size_t i) const noexcept
     {
-        return bank_[i].info.unilateral && bank_[i].enabled && bank_[i].side == Side::below;
+        return guards_[i].info.unilateral && guards_[i].enabled && guards_[i].side == Side::below;
     }
 
     /// The first unilateral guard that fired, if the resets have changed nothing; else `no_guard`.
@@ -1021,7 +1021,7 @@ protected:
     template <class Visitor>
     void visit_guards(Visitor&& visit)
     {
-        if (guarded_) bank_.visit(visit);
+        if (guarded_) guards_.visit(visit);
     }
 
     static constexpr double stale = std::numeric_limits<double>::quiet_NaN();
@@ -1049,7 +1049,7 @@ protected:
     EventResolution resolution_;
     bool backward_;
     Step<X> step_;
-    GuardBank<X, single> bank_;
+    GuardTable<X, single> guards_;
     EventSearch<X, single> search_;
     std::optional<Planner<X, single>> planner_;
     double h_next_ = 0;        ///< [s] approximate length of the next step
@@ -1087,7 +1087,7 @@ protected:
     double set_time_ = 0;
     Mode mode_before_ = 0;
     struct {
-        std::vector<typename GuardBank<X, single>::Kept> guards;
+        std::vector<typename GuardTable<X, single>::Kept> guards;
         std::vector<Note> notes;
         std::uint64_t disabled = 0, disabled_in_search = 0;
         bool uses_space = false;  ///< of the search

@@ -79,14 +79,14 @@ void EventEngine<X, single>::note_lost(const X& before, const X& after, bool loc
 }
 
 template <class X, bool single>
-inline void EventEngine<X, single>::find_band(std::size_t i, double t)
+inline void EventEngine<X, single>::find_tolerance(std::size_t i, double t)
 {
-    GuardRecord& record = bank_[i];
+    GuardRecord& record = guards_[i];
     const Location& where = search_.where(i);
     record.jumped = where.jump;
     if (where.jump) {  // the state is beyond the jump, and the guard is not small there
         record.estimated = false;
-        record.noted.band = 0;
+        record.noted.tolerance = 0;
         return;
     }
     const double residue = system_->bounded ? 2 * std::fabs(where.slope) * where.error : infinity;
@@ -94,8 +94,8 @@ inline void EventEngine<X, single>::find_band(std::size_t i, double t)
                        search_.at() == where.root && !search_.late();
     const double known = search_.value_at_set(i);
     record.noted.value = known == known ? known : value_at_set(i, t);
-    record.noted.band =
-        record.estimated ? std::max(residue, bank_.touch(i, step_.h())) : record.noted.value;
+    record.noted.tolerance =
+        record.estimated ? std::max(residue, guards_.touch(i, step_.h())) : record.noted.value;
 }
 
 template <class X, bool single>
@@ -190,7 +190,7 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::timer_is_endless()
 {
     timer_at_once_ = std::exchange(timer_instant_, instant_) == instant_ ? timer_at_once_ + 1 : 1;
-    return timer_at_once_ == tolerances::events_at_once || repeats_level({});
+    return timer_at_once_ == tolerances::events_at_instant || repeats_level({});
 }
 
 template <class X, bool single>

@@ -23,7 +23,7 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
             return false;
         }
     }
-    if (bank_.size() == 0 || (phases_ && bank_.is_idle())) return false;
+    if (guards_.size() == 0 || (phases_ && guards_.is_idle())) return false;
     sample_end();
     const bool dips = !single && defers_ && bounds_show_event();
     if (any_suspicious() || dips || has_ties()) return true;
@@ -36,24 +36,24 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
 template <class X, bool single>
 inline bool EventEngine<X, single>::is_suspicious(bool everywhere)
 {
-    if (!bank_.checked()) return bank_.suspicious(step_.h());
+    if (!guards_.checked()) return guards_.suspicious(step_.h());
     const bool stands = everywhere && step_.stands();
-    if (everywhere && !(stands && bank_.are_cubics_of_time())) {
+    if (everywhere && !(stands && guards_.are_cubics_of_time())) {
         X& x = search_.space(step_.x0());
         if (stands) assign(x, step_.x0());
         for (const double u : CubicCheck::places) {
             if (!stands) step_.peek(u * step_.h(), x);
-            bank_.sample_place(step_, u, x, calls());
+            guards_.sample_place(step_, u, x, calls());
         }
-        return bank_.suspicious(step_.h());
+        return guards_.suspicious(step_.h());
     }
-    if (!bank_.doubtful(step_.h())) return false;
-    if (bank_.needs_second_check(step_.h()) && !bank_.sample_doubtful_further(step_, calls())) {
+    if (!guards_.doubtful(step_.h())) return false;
+    if (guards_.needs_second_check(step_.h()) && !guards_.sample_doubtful_further(step_, calls())) {
         X& x = search_.space(step_.x0());
         step_.peek(CubicCheck::further * step_.h(), x);
-        bank_.sample_further(step_, x, calls());
+        guards_.sample_further(step_, x, calls());
     }
-    return bank_.suspicious(step_.h());
+    return guards_.suspicious(step_.h());
 }
 
 template <class X, bool single>
@@ -63,11 +63,11 @@ inline void EventEngine<X, single>::check_inside()
         // Components that no guard reads are not computed.
         X x(step_.x0().size());
         step_.template peek<InsideOf>(x);
-        bank_.sample_inside(step_, x, calls());
+        guards_.sample_inside(step_, x, calls());
     } else {
         X& x = search_.space(step_.x0());
         step_.template peek<InsideOf>(x);
-        bank_.sample_inside(step_, x, calls());
+        guards_.sample_inside(step_, x, calls());
     }
 }
 
@@ -106,10 +106,10 @@ template <class Before>
 inline bool EventEngine<X, single>::find(bool cleared, const Before& before_resets)
 {
     search_.begin(step_.x0());
-    if (bank_.waiting()) end_plateaus();
-    bank_.begin_search(step_.h());
+    if (guards_.waiting()) end_plateaus();
+    guards_.begin_search(step_.h());
     for (bool may_tie = true;;) {
-        const bool found = search_.find_set(step_, bank_, time_event_due_, calls());
+        const bool found = search_.find_set(step_, guards_, time_event_due_, calls());
         if (!single && cuts_before_windows_ && found && may_tie && ends_inside_window())
             return false;
         const bool tied = may_tie && add_ties(found);
@@ -122,8 +122,8 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
         on_change_ = change_due_ && search_.at() == step_.h();
         if (search_.fired().empty() && !(tied && on_time_)) continue;
         const bool met =
-            tied ? search_.meet_conditions_on_time(step_, bank_, calls())
-                 : on_time_ || on_change_ || search_.meet_conditions(step_, bank_, calls());
+            tied ? search_.meet_conditions_on_time(step_, guards_, calls())
+                 : on_time_ || on_change_ || search_.meet_conditions(step_, guards_, calls());
         run_.statistics.unmet_conditions += !met;
         left_known_ = system_->moded || any_stands();
         if (left_known_) {
@@ -153,7 +153,7 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
         record_notes(step_.h());
     }
     count_refined();
-    bank_.pass_on_after_events();
+    guards_.pass_on_after_events();
     return false;
 }
 
@@ -187,17 +187,17 @@ inline void EventEngine<X, single>::dismiss_members()
         const std::size_t i = fired[k];
         const double t = step_.time(search_.at());
         const Side side = search_.side_left(i);
-        if (bank_[i].side != side) bank_.arm(i, side);
+        if (guards_[i].side != side) guards_.arm(i, side);
         if (!system_.enabled_at(i, step_.mode(), t, search_.before())) {
             ++run_.statistics.disabled;
-        } else if (repeats(i, t) && !bank_[i].info.unilateral && !turned_back(i)) {
+        } else if (repeats(i, t) && !guards_[i].info.unilateral && !turned_back(i)) {
             ++run_.statistics.suppressed;
         } else {
-            bank_[i].again = repeats(i, t) && turned_back(i);
+            guards_[i].again = repeats(i, t) && turned_back(i);
             fired[kept++] = i;
             continue;
         }
-        search_.pass(step_, bank_, i, calls());
+        search_.pass(step_, guards_, i, calls());
     }
     fired.shrink(kept);
 }
@@ -208,7 +208,7 @@ inline bool EventEngine<X, single>::changes_nothing()
     if (cuts_at_all_ || resets_.stops()) return false;
     if (resets_.mode() != step_.mode() || resets_.conflict().first != no_guard) return false;
     for (const std::size_t i : search_.fired()) {
-        if (bank_[i].info.unilateral || ends_run(i)) return false;
+        if (guards_[i].info.unilateral || ends_run(i)) return false;
     }
     return same_state(resets_.after(), search_.before());
 }
@@ -218,10 +218,10 @@ bool EventEngine<X, single>::changed_elsewhere()
 {
     if (step_.is_hosts()) return false;
     const auto fired = search_.fired().span();
-    const auto resets = [&](std::size_t i) { return bank_[i].info.resets; };
+    const auto resets = [&](std::size_t i) { return guards_[i].info.resets; };
     if (std::none_of(fired.begin(), fired.end(), resets)) return false;
     if (!step_.flow_ends_alike(resets_.scratch())) return true;
-    return !bank_.end_alike(step_, calls());
+    return !guards_.end_alike(step_, calls());
 }
 
 template <class X, bool single>
@@ -231,16 +231,16 @@ bool EventEngine<X, single>::acts_beyond()
     const auto fired = search_.fired().span();
     // A reset that is told the direction of its crossing may be meant for one direction alone.
     const auto is_meant = [this](std::size_t i) {
-        const GuardInfo& info = bank_[i].info;
+        const GuardInfo& info = guards_[i].info;
         return info.resets && !(system_->tell_direction && info.crossing == Crossing::either);
     };
     for (const std::size_t i : fired) count += is_meant(i);
     const std::size_t i = fired[0];
     const bool asks = system_->moded && system_->reset && !system_->after_set;
-    if (!asks || fired.size() > 1 || !bank_[i].info.resets) return false;
+    if (!asks || fired.size() > 1 || !guards_[i].info.resets) return false;
     X& x = resets_.scratch();
     if (kept_.uses_space) search_.put_space_back();
-    const double t = search_.go_beyond(step_, bank_, i, x, calls());
+    const double t = search_.go_beyond(step_, guards_, i, x, calls());
     if (t == t && resets_.ask_again(system_, i, step_.mode(), t, x, search_.before())) {
         count -= is_meant(i);
         return true;
@@ -252,7 +252,7 @@ bool EventEngine<X, single>::acts_beyond()
 template <class X, bool single>
 inline bool EventEngine<X, single>::ends_run(std::size_t i) const noexcept
 {
-    const GuardRecord& record = bank_[i];
+    const GuardRecord& record = guards_[i];
     if (is_of_phases(i)) return false;
     if (options_.stop_at_event) return true;
     return record.info.stop_after > 0 &&
@@ -266,8 +266,8 @@ inline void EventEngine<X, single>::go_on_past_members()
         // A crossing that was joined to the end of the run is left to a run that starts there,
         // whose state lies before it.
         if (!time_event_due_ && search_.was_joined(step_, i)) continue;
-        search_.note(i, bank_[i].side, records_states());
-        search_.pass(step_, bank_, i, calls());
+        search_.note(i, guards_[i].side, records_states());
+        search_.pass(step_, guards_, i, calls());
     }
 }
 
@@ -275,13 +275,13 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::bounds_show_event()
 {
     search_.cover().begin();
-    bank_.forget_dips();
+    guards_.forget_dips();
     bool any = false;
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        const GuardRecord& record = std::as_const(bank_)[i];
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        const GuardRecord& record = std::as_const(guards_)[i];
         if (!record.enabled || record.deferred) continue;
-        const bool dips = search_.bounds_show_event(step_, bank_, i, calls());
-        bank_.note_dip(i, dips);
+        const bool dips = search_.bounds_show_event(step_, guards_, i, calls());
+        guards_.note_dip(i, dips);
         any = any || dips;
     }
     return any;
@@ -291,26 +291,27 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::judges_suspicious()
 {
     search_.cover().begin();
-    bank_.forget_dips();
-    planner_->close_inside(step_, bank_, search_, run_.statistics);
+    guards_.forget_dips();
+    planner_->close_inside(step_, guards_, search_, run_.statistics);
     if (planner_->judged().empty()) {
         count_covered();
         count_deferred(1);
         return false;
     }
-    planner_->wake(step_, bank_, run_.statistics, last_h_);
+    planner_->wake(step_, guards_, run_.statistics, last_h_);
     for (const std::size_t i : planner_->judged()) {
-        const bool open = bank_.starts_at_event(i, step_) || std::as_const(bank_)[i].info.boolean;
+        const bool open =
+            guards_.starts_at_event(i, step_) || std::as_const(guards_)[i].info.boolean;
         if (!open) continue;
-        bank_.note_dip(i, search_.bounds_show_event(step_, bank_, i, calls()));
+        guards_.note_dip(i, search_.bounds_show_event(step_, guards_, i, calls()));
     }
     for (const std::size_t i : planner_->judged()) {
-        if (bank_.leaves_plateau(i) || bank_.suspicious(i, step_.h())) return true;
+        if (guards_.leaves_plateau(i) || guards_.suspicious(i, step_.h())) return true;
     }
     if (has_ties()) return true;
     count_covered();
     run_.statistics.evidence.add(finders_.detector.evidence);
-    for (const std::size_t i : planner_->judged()) bank_.leave_plateau(i);
+    for (const std::size_t i : planner_->judged()) guards_.leave_plateau(i);
     return false;
 }
 

@@ -23,7 +23,7 @@ double EventEngine<X, single>::drift(const Following& by, const Flow& flow)
     flow(end, later, rate_later);
     move(later, x, by.ahead / 2, rate);
     move(later, later, by.ahead / 2, rate_later);
-    const auto guard = bank_.view(by.guard, step_.mode(), calls());
+    const auto guard = guards_.view(by.guard, step_.mode(), calls());
     return guard.value(end, later) - guard.value(by.t, x);
 }
 
@@ -37,7 +37,7 @@ template <class X, bool single>
 bool EventEngine<X, single>::presses(const Rested& rested, Hold& hold)
 {
     const std::size_t i = rested.guard;
-    const GuardRecord& record = std::as_const(bank_)[i];
+    const GuardRecord& record = std::as_const(guards_)[i];
     const Mode mode = step_.mode();
     if (record.info.boolean || !system_.enabled_in(i, mode) || !is_enabled_here(i)) return false;
     const Crossing crossing = record.info.crossing;
@@ -47,8 +47,8 @@ bool EventEngine<X, single>::presses(const Rested& rested, Hold& hold)
                   : sign_of(record.last_side) == 0 ? 1
                                                    : sign_of(record.last_side);
     hold.rounding = rounding_of(i);
-    hold.level = std::max(hold.rounding, rested.band);
-    const double g = bank_.view(i, mode, calls()).value(step_.time(0), step_.x0());
+    hold.level = std::max(hold.rounding, rested.tolerance);
+    const double g = guards_.view(i, mode, calls()).value(step_.time(0), step_.x0());
     if (hold.inward * g > hold.level) return false;
     if (!system_->flow) return hold.inward * departure(i, h_next_) <= 0;
     // The first derivative that is not zero decides, and a short drift shows its sign. The drift
@@ -85,7 +85,7 @@ template <class X, bool single>
 void EventEngine<X, single>::hold_again()
 {
     if (!system_->rest) return;
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
         Hold hold;
         if (!is_at_rest(i) || !presses({i, 0, 0}, hold) || !finds_components(hold)) continue;
         holds_.push_back(hold);
@@ -101,11 +101,11 @@ template <class X, bool single>
 bool EventEngine<X, single>::is_at_rest(std::size_t i)
 {
     const Mode mode = step_.mode();
-    const GuardInfo& info = std::as_const(bank_)[i].info;
+    const GuardInfo& info = std::as_const(guards_)[i].info;
     if (is_of_phases(i) || info.boolean || !(resets_any_ && info.resets)) return false;
     if (!system_.enabled_in(i, mode)) return false;
     const double t = step_.time(0);
-    const double g = bank_.view(i, mode, calls()).value(t, step_.x0());
+    const double g = guards_.view(i, mode, calls()).value(t, step_.x0());
     if (!(std::fabs(g) <= rounding_of(i))) return false;
     X x = step_.x0();
     return system_->rest(system_.adapter(), i, mode, t, x) == mode && same_state(x, step_.x0());
@@ -160,7 +160,7 @@ template <class X, bool single>
 bool EventEngine<X, single>::stays_held(const Hold& hold)
 {
     const double t = step_.time(0);
-    const double g = bank_.view(hold.guard, step_.mode(), calls()).value(t, step_.x0());
+    const double g = guards_.view(hold.guard, step_.mode(), calls()).value(t, step_.x0());
     if (!(std::fabs(g) <= hold.level)) return false;
     if (!system_->flow) return true;
     const auto held = [this](double at, const X& x, X& dxdt) {
@@ -181,17 +181,17 @@ void EventEngine<X, single>::renew_holds()
     components.erase(std::unique(components.begin(), components.end()), components.end());
     step_.hold_components({components.data(), components.size()});
     on_series_ = may_be_on_series_ && step_.has_guard_series();
-    bank_.leave_series();
+    guards_.leave_series();
     changed_holds_ = 2;
 }
 
 template <class X, bool single>
 void EventEngine<X, single>::release(std::size_t k)
 {
-    GuardRecord& record = bank_[holds_[k].guard];
+    GuardRecord& record = guards_[holds_[k].guard];
     record.intervals.come_to_rest();
-    record.band = holds_[k].level;  // it is on its surface
-    bank_.row().clear();
+    record.tolerance = holds_[k].level;  // it is on its surface
+    guards_.row().clear();
     holds_.erase(holds_.begin() + static_cast<std::ptrdiff_t>(k));
     resting_ = false;
     renew_holds();
@@ -240,7 +240,7 @@ void EventEngine<X, single>::release_here(std::size_t k)
             .after = step_.x0(),
             .bracket = {t, t},
             .slope = 0});
-    bank_.take_bands();
+    guards_.take_tolerances();
     release(k);
     leaves_phase_ = changed_mode_ = enters_mode_ = false;
     if (!step_.is_of_host()) step_.refresh();
@@ -314,7 +314,7 @@ template <class X, bool single>
 std::size_t EventEngine<X, single>::guard_left_at(double t, const X& x)
 {
     for (const Hold& hold : holds_) {
-        const double g = bank_.view(hold.guard, step_.mode(), calls()).value(t, x);
+        const double g = guards_.view(hold.guard, step_.mode(), calls()).value(t, x);
         if (!(std::fabs(g) <= hold.level + 8 * hold.rounding)) return hold.guard;
     }
     return no_guard;
@@ -344,10 +344,10 @@ bool EventEngine<X, single>::stands_still()
 template <class X, bool single>
 bool EventEngine<X, single>::guards_stand_still(double t)
 {
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
         if (!system_.enabled_in(i, step_.mode())) continue;
         if (is_held(i) && !system_.enabled_at(i, step_.mode(), t, step_.x0())) return false;
-        const auto guard = bank_.view(i, step_.mode(), calls());
+        const auto guard = guards_.view(i, step_.mode(), calls());
         const double g = guard.value(step_.time(0), step_.x0());
         const double moved = std::fabs(guard.value(t, step_.x0()) - g);
         if (moved == 0) continue;
@@ -367,7 +367,7 @@ void EventEngine<X, single>::visit_holds(Visitor&& visit)
     std::size_t count = holds_.size();
     visit(count);
     if constexpr (!saves) {
-        if (count > bank_.size()) throw_snapshot_is_no_state("the number of rests");
+        if (count > guards_.size()) throw_snapshot_is_no_state("the number of rests");
         holds_.resize(count);
         resting_ = false;
     }

@@ -9,10 +9,10 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline void EventEngine<X, single>::note_crossings(double s)
 {
-    if (!bank_.suspects().empty()) bank_.complete_rates(step_, calls());
-    for (const std::size_t i : bank_.suspects()) {
-        if (bank_[i].acting || !bank_.suspicious(i, step_.h())) continue;
-        search_.note_crossings(step_, bank_, i, bank_.end(i, s), calls());
+    if (!guards_.suspects().empty()) guards_.complete_rates(step_, calls());
+    for (const std::size_t i : guards_.suspects()) {
+        if (guards_[i].acting || !guards_.suspicious(i, step_.h())) continue;
+        search_.note_crossings(step_, guards_, i, guards_.end(i, s), calls());
     }
 }
 
@@ -27,8 +27,8 @@ inline void EventEngine<X, single>::note_set()
         note_ties();
         note_vetoes();
     }
-    for (const std::size_t i : search_.fired()) find_band(i, t);
-    if (bank_.keeps_rows()) note_excursions();
+    for (const std::size_t i : search_.fired()) find_tolerance(i, t);
+    if (guards_.keeps_rows()) note_excursions();
     veto_touches(search_.at());
     if (search_.shows_polynomial() && records_states()) step_.prepare_polynomial();
 }
@@ -39,8 +39,8 @@ inline void EventEngine<X, single>::keep_suspects()
     kept_.guards.clear();
     kept_.notes.clear();
     if (!single || search_.fired().empty()) {
-        for (const std::size_t i : bank_.suspects()) {
-            if (!is_member(i)) kept_.guards.push_back(bank_.keep(i));
+        for (const std::size_t i : guards_.suspects()) {
+            if (!is_member(i)) kept_.guards.push_back(guards_.keep(i));
         }
     }
     if (!search_.notes().empty()) kept_.notes = search_.notes();
@@ -55,8 +55,8 @@ inline void EventEngine<X, single>::keep_suspects()
 template <class X, bool single>
 inline void EventEngine<X, single>::put_suspects_back()
 {
-    for (const std::size_t i : search_.fired()) bank_[i].noted.band = 0;
-    for (const auto& guard : kept_.guards) bank_.put_back(guard);
+    for (const std::size_t i : search_.fired()) guards_[i].noted.tolerance = 0;
+    for (const auto& guard : kept_.guards) guards_.put_back(guard);
     search_.notes() = kept_.notes;
     run_.statistics.disabled = kept_.disabled;
     search_.disabled = kept_.disabled_in_search;
@@ -67,63 +67,63 @@ inline void EventEngine<X, single>::note_vetoes()
 {
     if (!system_->enabled_at) return;
     const double t = time_event_;
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        const GuardRecord& record = std::as_const(bank_)[i];
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        const GuardRecord& record = std::as_const(guards_)[i];
         if (!record.acting || !record.enabled || record.info.boolean) continue;
         const bool vetoed = !system_.enabled_at(i, step_.mode(), t, search_.before());
-        if (vetoed != record.noted.vetoed) bank_[i].noted.vetoed = vetoed;
+        if (vetoed != record.noted.vetoed) guards_[i].noted.vetoed = vetoed;
     }
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::note_crossings_to_set()
 {
-    if (search_.fired().size() == bank_.size()) return;
-    bank_.complete_rates(step_, calls());
-    for (const std::size_t i : bank_.suspects()) {
-        GuardRecord& record = bank_[i];
-        if (record.from == 0 && search_.comes_later(step_, bank_, i)) continue;
-        if (!bank_.suspicious(i, step_.h()) || is_member(i)) continue;
-        const GuardSample at = search_.sample_at_set(step_, bank_, i, calls());
+    if (search_.fired().size() == guards_.size()) return;
+    guards_.complete_rates(step_, calls());
+    for (const std::size_t i : guards_.suspects()) {
+        GuardRecord& record = guards_[i];
+        if (record.from == 0 && search_.comes_later(step_, guards_, i)) continue;
+        if (!guards_.suspicious(i, step_.h()) || is_member(i)) continue;
+        const GuardSample at = search_.sample_at_set(step_, guards_, i, calls());
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
         const double ulp = epsilon * std::fabs(step_.time(at.s));
         const double rounded = std::fabs(at.value) + std::fabs(at.rate) * ulp;
         const double close = 8 * finest_bracket(at.s, step_.h());
         if (record.from > at.s + close) {  // events that were found behind the set do not happen
-            if (at.value != 0) bank_.arm(i, side_of(at.value));
+            if (at.value != 0) guards_.arm(i, side_of(at.value));
             continue;
         }
         // It has crossed together with the set, without effect: rounding does not take the crossing
         // back.
         if (record.from > 0 && at.s - record.from <= close) {
-            if (!record.info.boolean) record.noted.band = rounded;
+            if (!record.info.boolean) record.noted.tolerance = rounded;
             continue;
         }
         const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays there
         const bool may_cross = !record.info.boolean && !rests && at.s > record.from;
-        const bool with_set = may_cross && (search_.crosses_with_set(step_, bank_, i, at) ||
+        const bool with_set = may_cross && (search_.crosses_with_set(step_, guards_, i, at) ||
                                             is_rounding_at_set(i, at));
         GuardSample last = at;
         // Until it crosses, a guard that crosses with the set is on the side from which it comes,
         // whatever its value is: the time of the set is rounded to a double.
-        if (with_set) record.noted.band = rounded;
+        if (with_set) record.noted.tolerance = rounded;
         if (with_set) last.value = -std::copysign(std::numeric_limits<double>::min(), at.rate);
         if (!record.acting) {
-            search_.note_crossings(step_, bank_, i, last, calls());
+            search_.note_crossings(step_, guards_, i, last, calls());
         }
         // An acting guard that has left its side, but was located behind the set, has left it by
         // rounding of its value only: its own event is still to come.
         const bool to_come = record.acting && counts(record.side, record.info.crossing);
-        if (!to_come && has_left(record.side, last.value)) bank_.arm(i, opposite(record.side));
+        if (!to_come && has_left(record.side, last.value)) guards_.arm(i, opposite(record.side));
         const Side side = record.side;
         if (!with_set || side_of(last.value) != side) continue;
         if (!counts(side, record.info.crossing)) {
-            bank_.arm(i, opposite(side));
+            guards_.arm(i, opposite(side));
         } else if (!record.acting) {
             if (counts_at_set(i)) {
-                search_.note_at_set(bank_, i, side, at.rate);
+                search_.note_at_set(guards_, i, side, at.rate);
             } else {
-                bank_.arm(i, opposite(side));
+                guards_.arm(i, opposite(side));
             }
         }  // else its own event is still to come
     }
@@ -134,8 +134,8 @@ inline bool EventEngine<X, single>::is_rounding_at_set(std::size_t i, const Guar
 {
     const double size = std::fabs(at.value);
     const double moves = std::fabs(at.rate) * std::fabs(step_.time(at.s));
-    if (bank_[i].acting || has_left(bank_[i].side, at.value)) return false;
-    if (!(size <= tolerances::by_rounding * std::max(bank_.scale(i, step_.h()), moves)))
+    if (guards_[i].acting || has_left(guards_[i].side, at.value)) return false;
+    if (!(size <= tolerances::by_rounding * std::max(guards_.scale(i, step_.h()), moves)))
         return false;
     return size <= rounding_of(i, step_.mode(), step_.time(at.s), search_.before());
 }
@@ -152,7 +152,7 @@ inline bool EventEngine<X, single>::counts_at_set(std::size_t i)
 template <class X, bool single>
 inline void EventEngine<X, single>::count_event(std::size_t i, double t, Side side)
 {
-    GuardRecord& record = bank_[i];
+    GuardRecord& record = guards_[i];
     run_.statistics.events += !is_of_phases(i);
     ++record.events;
     record.last = t;
@@ -194,7 +194,7 @@ inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, boo
     if (!stops) stopper_ = i;
     stops_ = stops || ends_run(i);
     // At the start of a step the guard has been armed on the side to which it has been carried.
-    const Side side = bank_[i].side;
+    const Side side = guards_[i].side;
     count_event(i, t, located ? side : opposite(side));
     const ReactionChange* const change = phases_ ? change_under(i) : nullptr;
     if (phases_ && !phases_->records(phases_->adapter, i)) {
@@ -259,7 +259,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::record_jump(std::size_t i, Side before)
 {
     const double t = step_.time(0);
-    bank_[i].recorded_in = armings_;
+    guards_[i].recorded_in = armings_;
     count_event(i, t, before);
     record({.t = t,
             .guard = i,
@@ -316,7 +316,7 @@ inline void EventEngine<X, single>::record_notes(double s)
         const double t = time_of(note, s);
         count_event(note.guard, t, note.side);
         if (is_of_phases(note.guard)) continue;
-        bank_[note.guard].returned = note.kind == EventKind::touch;
+        guards_[note.guard].returned = note.kind == EventKind::touch;
         if (!options_.record_events) continue;
         Event<X> event{.t = t,
                        .kind = note.kind,

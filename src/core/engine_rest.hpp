@@ -10,10 +10,10 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::rest_fired()
 {
     bool rested = false;
-    const bool in_row = bank_.keeps_rows() && prolongs_row();
+    const bool in_row = guards_.keeps_rows() && prolongs_row();
     for (const std::size_t i : search_.fired()) {
-        ShrinkingIntervals& intervals = bank_[i].intervals;
-        const bool again = std::exchange(bank_[i].again, false);
+        ShrinkingIntervals& intervals = guards_[i].intervals;
+        const bool again = std::exchange(guards_[i].again, false);
         bool stalls = intervals.stalls(step_.start(), h_next_);
         if (stalls && comes_from_afar(i)) {
             stalls = false;
@@ -21,7 +21,7 @@ inline bool EventEngine<X, single>::rest_fired()
         }
         stalls = stalls || again;
         const double tolerance = resolution_.tolerance(step_.start().value);
-        const bool resetting = resets_any_ && bank_[i].info.resets;
+        const bool resetting = resets_any_ && guards_[i].info.resets;
         if (resetting && located_) {
             const Location& where = search_.where(i);
             intervals.blame(std::isfinite(where.error) ? where.error : where.hi - where.lo);
@@ -29,7 +29,7 @@ inline bool EventEngine<X, single>::rest_fired()
         if (stalls || (resetting && (fades(i) || intervals.accumulate(tolerance)))) {
             come_to_rest(i, stalls ? 0 : intervals.remainder(), intervals.error());
             rested = true;
-        } else if (in_row && bank_.row().ends_with(bank_[i].excursions)) {
+        } else if (in_row && guards_.row().ends_with(guards_[i].excursions)) {
             come_to_rest(i, 0, intervals.error());
             rested = true;
         }
@@ -42,16 +42,16 @@ template <class X, bool single>
 bool EventEngine<X, single>::comes_from_afar(std::size_t i)
 {
     const bool on_time = timed_ && passed_ == step_.start().value;
-    if (located_ || !bank_.keeps_armed() || (level_ <= 1 && !on_time)) return false;
-    if (std::as_const(bank_)[i].excursions.has_fallen()) return false;
-    return std::fabs(bank_.armed_value(i)) > tolerances::of_fading * rounding_of(i);
+    if (located_ || !guards_.keeps_armed() || (level_ <= 1 && !on_time)) return false;
+    if (std::as_const(guards_)[i].excursions.has_fallen()) return false;
+    return std::fabs(guards_.armed_value(i)) > tolerances::of_fading * rounding_of(i);
 }
 
 template <class X, bool single>
 bool EventEngine<X, single>::prolongs_row()
 {
-    if (!located_) return prolongs_row_at_once();
-    LostRow& row = bank_.row();
+    if (!located_) return prolongs_row_at_instant();
+    LostRow& row = guards_.row();
     const bool soon = row.follows_soon(step_.start());
     bool falls = soon && !on_time_ && !search_.fired().empty();
     for (const std::size_t i : search_.fired()) falls &= this->falls(i, soon);
@@ -59,25 +59,25 @@ bool EventEngine<X, single>::prolongs_row()
         row.clear();
         return false;
     }
-    for (const std::size_t i : search_.fired()) row.add(bank_[i].excursions);
+    for (const std::size_t i : search_.fired()) row.add(guards_[i].excursions);
     return true;
 }
 
 template <class X, bool single>
-bool EventEngine<X, single>::prolongs_row_at_once()
+bool EventEngine<X, single>::prolongs_row_at_instant()
 {
-    LostRow& row = bank_.row();
+    LostRow& row = guards_.row();
     if (row.is_empty() || on_time_) return false;
     for (const std::size_t i : search_.fired()) {
-        const Excursions& excursions = std::as_const(bank_)[i].excursions;
+        const Excursions& excursions = std::as_const(guards_)[i].excursions;
         // A guard that a reset has carried across its surface has had no excursion to lose.
-        const bool stood = std::fabs(bank_.armed_value(i)) <= excursions.rounding();
+        const bool stood = std::fabs(guards_.armed_value(i)) <= excursions.rounding();
         const bool has_had_some = excursions.has_fallen() && std::isfinite(excursions.end());
         if (!has_excursions(i) || !has_had_some || !stood) return false;
     }
     for (const std::size_t i : search_.fired()) {
-        bank_[i].excursions.vanish(step_.start().value);
-        row.add(bank_[i].excursions);
+        guards_[i].excursions.vanish(step_.start().value);
+        row.add(guards_[i].excursions);
     }
     return !search_.fired().empty();
 }
@@ -85,10 +85,10 @@ bool EventEngine<X, single>::prolongs_row_at_once()
 template <class X, bool single>
 bool EventEngine<X, single>::falls(std::size_t i, bool soon)
 {
-    GuardRecord& record = bank_[i];
+    GuardRecord& record = guards_[i];
     if (!has_excursions(i)) return false;
     Excursions& excursions = record.excursions;
-    const double interval = bank_.row().interval();
+    const double interval = guards_.row().interval();
     if (!soon) {
         excursions.pass(size_of_excursion(i, search_.where(i).slope, interval));
         return false;
@@ -110,12 +110,12 @@ template <class X, bool single>
 void EventEngine<X, single>::note_excursions()
 {
     const Instant at = on_time_ ? Instant{time_event_, 0} : Instant{set_time_, set_remainder_};
-    if (!bank_.row().would_follow_soon(at)) return;
+    if (!guards_.row().would_follow_soon(at)) return;
     const X& x = search_.before();
-    const double interval = bank_.row().interval_to(at);
+    const double interval = guards_.row().interval_to(at);
     for (const std::size_t i : search_.fired()) {
         if (!has_excursions(i)) continue;
-        GuardRecord& record = bank_[i];
+        GuardRecord& record = guards_[i];
         double& slope = record.noted.slope = search_.where(i).slope;
         const double size = size_of_excursion(i, slope, interval);
         Excursions& excursions = record.excursions;
@@ -130,7 +130,7 @@ void EventEngine<X, single>::note_excursions()
         X rate = x;
         step_.flow_in(step_.mode(), at.value, x, rate);
         const double scale = tolerances::per_difference * low_part * interval;
-        slope = bank_.view(i, step_.mode(), calls()).rate(at.value, x, rate, scale);
+        slope = guards_.view(i, step_.mode(), calls()).rate(at.value, x, rate, scale);
     }
 }
 
@@ -138,13 +138,13 @@ template <class X, bool single>
 inline double EventEngine<X, single>::size_of_excursion(std::size_t i, double slope,
                                                         double interval) const noexcept
 {
-    return std::fmax(std::fabs(bank_.armed_value(i)), std::fabs(slope) * interval / 4);
+    return std::fmax(std::fabs(guards_.armed_value(i)), std::fabs(slope) * interval / 4);
 }
 
 template <class X, bool single>
 inline bool EventEngine<X, single>::fades(std::size_t i)
 {
-    GuardRecord& record = bank_[i];
+    GuardRecord& record = guards_[i];
     record.turned = false;
     record.rated_over = stale;
     record.intervals.depart(infinity, false);
@@ -163,7 +163,7 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
         // A guard farther away than an error of location explains does not fade, whether it rises
         // or falls. An event without a location may be due to the reset of another guard, which has
         // carried this one across its surface.
-        const double beyond = located_ ? -away - 2 * record.band : -away;
+        const double beyond = located_ ? -away - 2 * record.tolerance : -away;
         if (std::max(away, beyond) > tolerances::of_fading * rounding) {
             record.turned = away > 0;
             return false;
@@ -173,7 +173,7 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
     }
     // Excursions are not lost in rounding where the guard came from far away, for example from
     // where a time event had put it.
-    const bool came_far = low && std::fabs(bank_.g0(i)) > tolerances::of_fading * rounding;
+    const bool came_far = low && std::fabs(guards_.g0(i)) > tolerances::of_fading * rounding;
     bool lost = false;
     if (!system_->rated) {
         if (low) {
@@ -206,11 +206,11 @@ template <class X, bool single>
 std::size_t EventEngine<X, single>::other_of_cycle(std::size_t i)
 {
     std::size_t other = no_guard;
-    if (!bank_.keeps_rows()) return other;
-    double last = 2 * bank_[i].intervals.interval();
-    for (std::size_t k = 0; k < bank_.size(); ++k) {
+    if (!guards_.keeps_rows()) return other;
+    double last = 2 * guards_[i].intervals.interval();
+    for (std::size_t k = 0; k < guards_.size(); ++k) {
         const double ago =
-            std::fabs(step_.start().value - std::as_const(bank_)[k].excursions.end());
+            std::fabs(step_.start().value - std::as_const(guards_)[k].excursions.end());
         if (k == i || !(ago <= last)) continue;
         last = ago;
         other = k;
@@ -234,8 +234,8 @@ double EventEngine<X, single>::error_by_rounding(double round)
 {
     double error = 0;
     const double t = step_.start().value;
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        const Excursions& excursions = std::as_const(bank_)[i].excursions;
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        const Excursions& excursions = std::as_const(guards_)[i].excursions;
         if (std::fabs(t - excursions.end()) <= 2 * round) error += excursions.error(t);
     }
     return error;
@@ -244,31 +244,31 @@ double EventEngine<X, single>::error_by_rounding(double round)
 template <class X, bool single>
 inline double EventEngine<X, single>::distance_put_back(std::size_t i)
 {
-    const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
-    return sign_of(bank_[i].last_side) * g;
+    const double g = guards_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
+    return sign_of(guards_[i].last_side) * g;
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, double error)
 {
     const std::size_t resting = resting_of_cycle(i);
-    if (resting == no_guard || is_of_phases(i) || bank_[i].intervals.outlast_rest()) {
+    if (resting == no_guard || is_of_phases(i) || guards_[i].intervals.outlast_rest()) {
         end(Outcome::zeno, i);
         run_.other_guard = other_of_cycle(i);
         return;
     }
     if (ended_) return;
-    if (resting != i) bank_[std::exchange(i, resting)].intervals.come_to_rest();
+    if (resting != i) guards_[std::exchange(i, resting)].intervals.come_to_rest();
     const X before = step_.x0();
     const Mode mode = step_.mode();
     ahead = std::min(ahead, step_.until(options_.t_end));
     if (timed_) ahead = std::min(ahead, step_.until(time_event_));
     // The rest of the state stands still while the time jumps to the limit of the events: a moving
     // floor would separate from the other bodies, or pass through them.
-    if (bank_.size() > 1 && ahead > tolerances::of_time * std::fabs(step_.start().value)) {
+    if (guards_.size() > 1 && ahead > tolerances::of_time * std::fabs(step_.start().value)) {
         error += std::exchange(ahead, 0);
     }
-    if (bank_.keeps_rows()) error += error_by_rounding(bank_[i].intervals.interval());
+    if (guards_.keeps_rows()) error += error_by_rounding(guards_[i].intervals.interval());
     const double t = step_.time(ahead);
     X after = before;
     const Mode mode_after = system_->rest(system_.adapter(), i, mode, t, after);
@@ -297,12 +297,12 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     step_.restart(ahead, 0, after, mode_after);
     start_beyond_time_event();
     for (const std::size_t k : search_.fired()) {
-        bank_[k].rated_over = stale;
+        guards_[k].rated_over = stale;
     }
-    bank_[i].intervals.come_to_rest();
-    bank_.row().clear();
-    const double band = std::exchange(bank_[i].band, 0);
-    if (!enters_mode_) rested_.push_back({i, band, ahead});
+    guards_[i].intervals.come_to_rest();
+    guards_.row().clear();
+    const double tolerance = std::exchange(guards_[i].tolerance, 0);
+    if (!enters_mode_) rested_.push_back({i, tolerance, ahead});
 }
 
 }  // namespace ricochet::detail

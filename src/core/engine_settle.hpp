@@ -73,7 +73,7 @@ inline bool EventEngine<X, single>::apply_next_set(bool on_time)
         apply(false, on_time);
         return !ended_;
     }
-    if (bank_.g0(stuck_) < -bank_[stuck_].band) {
+    if (guards_.g0(stuck_) < -guards_[stuck_].tolerance) {
         end(Outcome::outside_mode, stuck_);
         return false;
     }
@@ -90,10 +90,10 @@ inline std::size_t EventEngine<X, single>::endless_guard()
 {
     const std::span<const std::size_t> fired = search_.fired().span();
     for (const std::size_t i : fired) {
-        GuardRecord& record = bank_[i];
-        record.at_once =
-            std::exchange(record.instant, instant_) == instant_ ? record.at_once + 1 : 1;
-        if (record.at_once == tolerances::events_at_once) return i;
+        GuardRecord& record = guards_[i];
+        record.times_at_instant =
+            std::exchange(record.instant, instant_) == instant_ ? record.times_at_instant + 1 : 1;
+        if (record.times_at_instant == tolerances::events_at_instant) return i;
     }
     return repeats_level(fired) ? fired[0] : no_guard;
 }
@@ -117,7 +117,7 @@ inline std::size_t EventEngine<X, single>::stuck_guard()
 {
     if (resets_.mode() != step_.mode() || !same_state(resets_.after(), step_.x0())) return no_guard;
     for (const std::size_t i : search_.fired()) {
-        if (bank_[i].info.unilateral) return i;
+        if (guards_[i].info.unilateral) return i;
     }
     return no_guard;
 }
@@ -132,26 +132,26 @@ inline void EventEngine<X, single>::arm_at_start(bool begins)
     watching_ = false;
     last_h_ = h_next_;
     began_at_ = step_.time(0);
-    bank_.begin_phase(began_at_);
-    bank_.sample_start(step_, calls(), h_next_);
-    bank_.keep_armed_values();
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        if (std::as_const(bank_)[i].enabled) arm_one_at_start(i, begins);
+    guards_.begin_phase(began_at_);
+    guards_.sample_start(step_, calls(), h_next_);
+    guards_.keep_armed_values();
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        if (std::as_const(guards_)[i].enabled) arm_one_at_start(i, begins);
     }
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
 {
-    GuardRecord& record = bank_[i];
+    GuardRecord& record = guards_[i];
     const GuardInfo& info = record.info;
-    const double g = bank_.g0(i);
+    const double g = guards_.g0(i);
     if (!std::isfinite(g)) throw_start_guard_not_finite(who_, i, info.name, options_.t_start, g);
     // A restart may leave the guard on the side on which it was before its event at this time.
     const bool had_event = !begins && !record.acting && has_event_at(i, began_at_);
     const bool on =
         g == 0 || ((info.unilateral ? g < 0 : had_event) && std::fabs(g) <= rounding_of(i));
-    if (on) record.band = std::fabs(g);
+    if (on) record.tolerance = std::fabs(g);
     record.departs = on;
     const Side side = on ? heading(i) : side_of(g);
     const bool asks = begins && info.at_start && !counts(side, info.crossing);
@@ -160,14 +160,14 @@ inline void EventEngine<X, single>::arm_one_at_start(std::size_t i, bool begins)
     if (arming == life::Arming::outside && is_enabled_here(i)) {
         throw_start_outside_mode(who_, i, info.name, options_.t_start, g);
     }
-    bank_.arm(i, side);
-    if (side == Side::plateau) bank_.await(i, life::awaited_side(life::Cause::start, info, side));
+    guards_.arm(i, side);
+    if (side == Side::plateau) guards_.await(i, life::awaited_side(life::Cause::start, info, side));
     if (arming == life::Arming::waits) {
         // A guard with `at_start` has already fired in the run that this one continues.
         const bool is_known = !begins && info.at_start && options_.continues;
         if (!record.acting || is_known) return;
         if (is_beyond(side, info.crossing)) count_armed_beyond(i, on);
-        if (side == Side::plateau) bank_[i].armed_on = true;
+        if (side == Side::plateau) guards_[i].armed_on = true;
     } else if (arming != life::Arming::outside && counts_here(i)) {
         have_event(i, arming, side);
     }
@@ -183,10 +183,10 @@ inline bool EventEngine<X, single>::has_event_at(std::size_t i, double t) const
 template <class X, bool single>
 inline void EventEngine<X, single>::forget_armed_beyond()
 {
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        const GuardRecord& record = std::as_const(bank_)[i];
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        const GuardRecord& record = std::as_const(guards_)[i];
         if (!record.armed_beyond || is_beyond(record.side, record.info.crossing)) continue;
-        bank_[i].armed_beyond = bank_[i].armed_on = false;
+        guards_[i].armed_beyond = guards_[i].armed_on = false;
         --run_.statistics.armed_beyond;
     }
 }
@@ -194,10 +194,10 @@ inline void EventEngine<X, single>::forget_armed_beyond()
 template <class X, bool single>
 inline void EventEngine<X, single>::note_left_start(std::size_t i)
 {
-    const GuardRecord& record = std::as_const(bank_)[i];
+    const GuardRecord& record = std::as_const(guards_)[i];
     if (record.armed_beyond || !std::isnan(record.last) || !record.enabled) return;
     if (!is_beyond(record.side, record.info.crossing)) return;
-    const double g = bank_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
+    const double g = guards_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
     if (side_of(g) != record.side || std::fabs(g) <= rounding_of(i)) return;
     count_armed_beyond(i, true);
 }
@@ -207,7 +207,7 @@ inline void EventEngine<X, single>::have_event(std::size_t i, life::Arming armin
 {
     if (arming == life::Arming::by_condition) {
         fire_by_condition(i);
-    } else if (std::as_const(bank_)[i].acting) {
+    } else if (std::as_const(guards_)[i].acting) {
         search_.fired().push_back(i);
     } else {
         record_jump(i, from);
@@ -217,9 +217,9 @@ inline void EventEngine<X, single>::have_event(std::size_t i, life::Arming armin
 template <class X, bool single>
 inline void EventEngine<X, single>::fire_by_condition(std::size_t i)
 {
-    const Side inside = bank_[i].info.crossing == Crossing::falling ? Side::above : Side::below;
-    if (bank_[i].acting) {
-        bank_.arm(i, opposite(inside));
+    const Side inside = guards_[i].info.crossing == Crossing::falling ? Side::above : Side::below;
+    if (guards_[i].acting) {
+        guards_.arm(i, opposite(inside));
         search_.fired().push_back(i);
     } else {
         record_jump(i, inside);
@@ -229,24 +229,24 @@ inline void EventEngine<X, single>::fire_by_condition(std::size_t i)
 template <class X, bool single>
 inline bool EventEngine<X, single>::fires_at_entry(std::size_t i) noexcept
 {
-    const GuardRecord& record = std::as_const(bank_)[i];
+    const GuardRecord& record = std::as_const(guards_)[i];
     return record.info.at_entry && enters_mode_ && !counts(record.side, record.info.crossing);
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::enable_guards()
 {
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
         const bool enabled = system_.enabled_in(i, step_.mode()) && !is_held(i);
-        const GuardRecord& now = std::as_const(bank_)[i];
+        const GuardRecord& now = std::as_const(guards_)[i];
         const bool enters = enters_mode_ && now.info.at_entry;
         if (enabled == now.enabled && !now.newly_enabled && !enters) continue;
-        GuardRecord& record = bank_[i];
+        GuardRecord& record = guards_[i];
         record.newly_enabled = enabled && (enters || !record.enabled);
         if (record.newly_enabled) record.last = std::numeric_limits<double>::quiet_NaN();
         record.enabled = enabled;
     }
-    bank_.heed_enabled();
+    guards_.heed_enabled();
     if (changed_holds_ > 0) --changed_holds_;
 }
 
@@ -255,26 +255,26 @@ inline void EventEngine<X, single>::arm_all()
 {
     double widest = 0;
     ++armings_;
-    bank_.forget_fired();
+    guards_.forget_fired();
     for (const std::size_t i : search_.fired()) {
-        bank_[i].fired = true;
-        widest = std::max(widest, bank_[i].band);
+        guards_[i].fired = true;
+        widest = std::max(widest, guards_[i].tolerance);
     }
     search_.fired().clear();
     if (system_->moded || changed_holds_ > 0) enable_guards();
-    bank_.await_none();
+    guards_.await_none();
     newly_armed_ = true;
     watching_ = false;
     last_h_ = h_next_;
-    bank_.begin_phase(step_.time(0));
-    bank_.sample_start(step_, calls(), h_next_);
-    bank_.keep_armed_values();
+    guards_.begin_phase(step_.time(0));
+    guards_.sample_start(step_, calls(), h_next_);
+    guards_.keep_armed_values();
     bool goes_on = true;
-    bank_.for_each_to_arm([&](std::size_t i) {
+    guards_.for_each_to_arm([&](std::size_t i) {
         if (!goes_on) return;
-        if (!bank_[i].enabled) {
-            bank_.arm(i, Side::plateau);
-        } else if (const bool opens = ends_veto(i); opens || single || !bank_.stays_armed(i)) {
+        if (!guards_[i].enabled) {
+            guards_.arm(i, Side::plateau);
+        } else if (const bool opens = ends_veto(i); opens || single || !guards_.stays_armed(i)) {
             goes_on = arm_one(i, widest, opens);
         }
     });
@@ -286,8 +286,8 @@ inline void EventEngine<X, single>::arm_all()
 template <class X, bool single>
 inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool opens)
 {
-    GuardRecord& record = bank_[i];
-    const double g = bank_.g0(i);
+    GuardRecord& record = guards_[i];
+    const double g = guards_.g0(i);
     if (!std::isfinite(g)) {
         end_not_finite("", i);
         return false;
@@ -301,10 +301,10 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
                               : opens                                 ? life::Cause::opened
                                                                       : life::Cause::stood;
     record.departs = seen.on || record.fired || record.newly_enabled;
-    bank_.arm(i, side);
+    guards_.arm(i, side);
     record.from = 0;
     if (side == Side::plateau) {
-        bank_.await(i, life::awaited_side(cause, record.info, before));
+        guards_.await(i, life::awaited_side(cause, record.info, before));
     }
     if (changed_mode_ && located_ && crossing == Crossing::either && record.fired &&
         record.acting && side == before && side != Side::plateau) {
@@ -331,23 +331,24 @@ template <class X, bool single>
 inline auto EventEngine<X, single>::see(std::size_t i, Side before, double widest, bool opens)
     -> Seen
 {
-    GuardRecord& record = bank_[i];
-    const double g = bank_.g0(i);
-    if (record.fired && record.estimated && std::fabs(g) > record.band) {
-        record.band = record.noted.value;
+    GuardRecord& record = guards_[i];
+    const double g = guards_.g0(i);
+    if (record.fired && record.estimated && std::fabs(g) > record.tolerance) {
+        record.tolerance = record.noted.value;
     }
     record.estimated = false;
-    const double band = record.newly_enabled ? std::max(widest, record.band) : record.band;
-    const bool rounded = std::fabs(g) > band && is_flipped_by_rounding(i, before);
-    if (rounded || opens) record.band = std::fabs(g);
-    if (rounded || opens || std::fabs(g) <= band) {
+    const double tolerance =
+        record.newly_enabled ? std::max(widest, record.tolerance) : record.tolerance;
+    const bool rounded = std::fabs(g) > tolerance && is_flipped_by_rounding(i, before);
+    if (rounded || opens) record.tolerance = std::fabs(g);
+    if (rounded || opens || std::fabs(g) <= tolerance) {
         const Side head = heading(i);
         return {head, true, is_now_set_off(i, head)};
     }
     if (changed_mode_ && stays_within_rounding(i)) {
         const Side head = heading(i);
         if (is_now_set_off(i, head)) {
-            record.band = std::fabs(g);
+            record.tolerance = std::fabs(g);
             return {head, true, true};
         }
     }
@@ -358,15 +359,15 @@ template <class X, bool single>
 bool EventEngine<X, single>::ends_veto(std::size_t i)
 {
     if (!system_->enabled_at || !leaves_phase_ || !on_time_) return false;
-    const GuardRecord& record = std::as_const(bank_)[i];
+    const GuardRecord& record = std::as_const(guards_)[i];
     if (!record.acting || record.fired || record.newly_enabled || record.info.boolean) return false;
     return record.noted.vetoed && lies_within_rounding(i) && is_enabled_here(i);
 }
 
 template <class X, bool single>
-bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
+bool EventEngine<X, single>::leaves_here(std::size_t i, Side side)
 {
-    const GuardRecord& record = bank_[i];
+    const GuardRecord& record = guards_[i];
     if (!leaves_phase_ || record.newly_enabled || side == Side::plateau) return false;
     const bool either = record.info.crossing == Crossing::either;
     if (record.info.boolean || (either && record.fired)) return false;
@@ -380,11 +381,11 @@ bool EventEngine<X, single>::leaves_at_once(std::size_t i, Side side)
         step_.flow_in(mode_before_, t, left, left_rate_);
     }
     left_known_ = true;
-    const auto guard = bank_.view(i, step_.mode(), calls());
+    const auto guard = guards_.view(i, step_.mode(), calls());
     const double moved = guard.rate(t, step_.x0(), left_rate_, h_next_);
     // Along the flow that was left it stood, or moved the other way, by more than rounding.
     const double noise =
-        tolerances::of_location * std::fabs(bank_.complete_rate0(i, step_, h_next_, calls()));
+        tolerances::of_location * std::fabs(guards_.complete_rate0(i, step_, h_next_, calls()));
     if (sign_of(side) * moved > noise) return false;
     if (either && sign_of(side) * moved < -noise) return false;  // a motion that turns back
     if (sign_of(side) * moved >= -noise) {  // a vanishing rate has the sign that it has later
@@ -417,7 +418,7 @@ bool EventEngine<X, single>::is_set_in_motion(std::size_t i)
         // A guard that has had its event at this instant does not have it again because a reset of
         // another guard lets its crossing go on.
         const double t = step_.time(0);
-        const double ago = std::fabs(t - std::as_const(bank_)[i].last);
+        const double ago = std::fabs(t - std::as_const(guards_)[i].last);
         if (!stands(i) || ago <= resolution_.blur(t)) return false;
     }
     return !(same_state(search_.before(), step_.x0()) && same_state(left_rate_, step_.rate0()));
@@ -426,7 +427,7 @@ bool EventEngine<X, single>::is_set_in_motion(std::size_t i)
 template <class X, bool single>
 bool EventEngine<X, single>::stays_within_rounding(std::size_t i)
 {
-    const GuardRecord& record = bank_[i];
+    const GuardRecord& record = guards_[i];
     if (record.fired || record.newly_enabled || record.info.boolean) return false;
     return lies_within_rounding(i);
 }
@@ -434,8 +435,8 @@ bool EventEngine<X, single>::stays_within_rounding(std::size_t i)
 template <class X, bool single>
 inline bool EventEngine<X, single>::is_flipped_by_rounding(std::size_t i, Side before)
 {
-    const GuardRecord& record = bank_[i];
-    const double g = bank_.g0(i);
+    const GuardRecord& record = guards_[i];
+    const double g = guards_.g0(i);
     if (record.fired || record.newly_enabled || record.info.boolean) return false;
     if (before == Side::plateau || side_of(g) != opposite(before)) return false;
     // If it is farther away, the reset of another guard has carried it across.
@@ -445,11 +446,12 @@ inline bool EventEngine<X, single>::is_flipped_by_rounding(std::size_t i, Side b
 template <class X, bool single>
 inline bool EventEngine<X, single>::lies_within_rounding(std::size_t i)
 {
-    const double g = bank_.g0(i);
-    const double rate = system_->bounded ? bank_.complete_rate0(i, step_, h_next_, calls())
-                                         : bank_.rate0(i);  // with bounds it may not be known
+    const double g = guards_.g0(i);
+    const double rate = system_->bounded ? guards_.complete_rate0(i, step_, h_next_, calls())
+                                         : guards_.rate0(i);  // with bounds it may not be known
     const double moves = std::fabs(rate) * (std::fabs(step_.time(0)) + h_next_);
-    if (!(std::fabs(g) <= tolerances::by_rounding * std::max(bank_.armed_scale(i, h_next_), moves)))
+    if (!(std::fabs(g) <=
+          tolerances::by_rounding * std::max(guards_.armed_scale(i, h_next_), moves)))
         return false;
     return std::fabs(g) <= rounding_of(i);
 }
@@ -457,29 +459,29 @@ inline bool EventEngine<X, single>::lies_within_rounding(std::size_t i)
 template <class X, bool single>
 inline Side EventEngine<X, single>::heading(std::size_t i)
 {
-    const bool known = bank_[i].fired && bank_[i].rated_over == h_next_;
-    double rate = known ? bank_[i].departure : bank_.complete_rate0(i, step_, h_next_, calls());
-    if (known) bank_.set_rate0(i, rate);
-    bank_[i].rated_over = stale;
+    const bool known = guards_[i].fired && guards_[i].rated_over == h_next_;
+    double rate = known ? guards_[i].departure : guards_.complete_rate0(i, step_, h_next_, calls());
+    if (known) guards_.set_rate0(i, rate);
+    guards_[i].rated_over = stale;
     if (!system_->rated) {
-        if (bank_[i].fired && bank_[i].turned && bank_[i].intervals.is_low()) {
-            rate = bank_[i].departure;
+        if (guards_[i].fired && guards_[i].turned && guards_[i].intervals.is_low()) {
+            rate = guards_[i].departure;
             if (rate == 0) {
                 // The guard is too slow for its rate to be known: its reset has sent it back,
                 // and its next event comes when it returns to the surface.
-                const Side back = bank_[i].last_side;
-                bank_.set_rate0(i, sign_of(back) * std::numeric_limits<double>::min());
+                const Side back = guards_[i].last_side;
+                guards_.set_rate0(i, sign_of(back) * std::numeric_limits<double>::min());
                 return back;
             }
-            bank_.set_rate0(i, rate);
+            guards_.set_rate0(i, rate);
         }
     }
-    if (bank_[i].info.boolean) return side_of(rate != 0 ? rate : bank_.g0(i));
+    if (guards_[i].info.boolean) return side_of(rate != 0 ? rate : guards_.g0(i));
     if (!std::isfinite(rate)) {
         end_not_finite(all_finite(step_.rate0()) ? "rate" : "flow", i);
         return Side::plateau;
     }
-    if (rate != 0 && bank_[i].fired) return side_of(rate);
+    if (rate != 0 && guards_[i].fired) return side_of(rate);
     // The second derivative has the sign that the rate will have a little later. A rate that it
     // cancels within the rounding of the time counts as zero, as does a rate that is only rounding.
     const double delta = tolerances::of_heading * h_next_;
@@ -487,14 +489,14 @@ inline Side EventEngine<X, single>::heading(std::size_t i)
     const double moment = tolerances::of_location * (std::fabs(step_.time(0)) + h_next_);
     double noise = std::fabs(next - rate) * std::min(moment / delta, 0.5);
     if (!system_->rated) {
-        if (!bank_[i].fired)
+        if (!guards_[i].fired)
             noise = std::max(noise, rounding_of(i) / (tolerances::of_difference * h_next_));
     }
     if (std::fabs(rate) > noise) return side_of(rate);
     // A guard of the position whose force is zero, too, leaves by its jerk.
     const double later = step_.is_hosts() ? next : rate_ahead(i, delta, h_next_, 2);
     const Side side = std::fabs(later) > noise ? side_of(later) : Side::plateau;
-    bank_.set_rate0(i, sign_of(side) * std::numeric_limits<double>::min());
+    guards_.set_rate0(i, sign_of(side) * std::numeric_limits<double>::min());
     return side;
 }
 
@@ -513,7 +515,7 @@ inline double EventEngine<X, single>::rate_ahead(std::size_t i, double ahead, do
         move(later, later, ahead / 2, rate_later);
         step_.flow(ahead, later, rate_later);
     }
-    return bank_.view(i, step_.mode(), calls())
+    return guards_.view(i, step_.mode(), calls())
         .rate(step_.inside(step_.time(ahead)), later, rate_later, scale);
 }
 
@@ -527,7 +529,7 @@ template <class X, bool single>
 inline double EventEngine<X, single>::rounding_of(std::size_t i, Mode mode, double t, const X& x)
 {
     constexpr double nudge = tolerances::of_state;
-    const auto guard = bank_.view(i, mode, calls());
+    const auto guard = guards_.view(i, mode, calls());
     const double g = guard.value(t, x);
     double beside = t * (1 + nudge);
     if (step_.inside(beside) != beside) beside = step_.inside(t * (1 - nudge));
@@ -548,9 +550,9 @@ inline bool EventEngine<X, single>::may_end() const noexcept
 {
     if (options_.max_steps < std::numeric_limits<std::uint64_t>::max()) return true;
     if (options_.cancelled && !setup_.cancels_by_itself) return true;
-    if (options_.stop_at_event) return bank_.size() > 0 || timed_;
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        if (bank_[i].info.stop_after > 0) return true;
+    if (options_.stop_at_event) return guards_.size() > 0 || timed_;
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        if (guards_[i].info.stop_after > 0) return true;
     }
     return false;
 }
@@ -558,8 +560,8 @@ inline bool EventEngine<X, single>::may_end() const noexcept
 template <class X, bool single>
 inline void EventEngine<X, single>::refuse_bad_guards()
 {
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        GuardRecord& record = bank_[i];
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        GuardRecord& record = guards_[i];
         const GuardInfo& info = record.info;
         record.acting = (resets_any_ && info.resets) || info.stop_after > 0 ||
                         options_.stop_at_event || cuts_at_all_;

@@ -9,18 +9,18 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline bool EventEngine<X, single>::may_tie(std::size_t i) const noexcept
 {
-    const GuardRecord& record = bank_[i];
+    const GuardRecord& record = guards_[i];
     if (!record.enabled || record.deferred || record.info.boolean) return false;
     if (!record.acting && !time_event_due_) return false;
     if (!counts(record.side, record.info.crossing)) return false;
-    return std::fabs(bank_.g1(i)) <= tolerances::by_rounding * bank_.scale(i, step_.h());
+    return std::fabs(guards_.g1(i)) <= tolerances::by_rounding * guards_.scale(i, step_.h());
 }
 
 template <class X, bool single>
 inline bool EventEngine<X, single>::has_ties()
 {
     if (!ends_on_time()) return false;
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
         if (may_tie(i) && rate_of_tie(i) != 0) return true;
     }
     return false;
@@ -29,12 +29,12 @@ inline bool EventEngine<X, single>::has_ties()
 template <class X, bool single>
 double EventEngine<X, single>::rate_of_tie(std::size_t i)
 {
-    const double sign = sign_of(bank_[i].side);
+    const double sign = sign_of(guards_[i].side);
     const double h = step_.h();
     const double t = step_.time(h);
-    const double g = bank_.g1(i);
+    const double g = guards_.g1(i);
     const auto rate_at = [&](double time, const X& x, const X& dxdt) {
-        return bank_.view(i, step_.mode(), calls()).rate(time, x, dxdt, h);
+        return guards_.view(i, step_.mode(), calls()).rate(time, x, dxdt, h);
     };
     const double rate = rate_at(t, step_.x1(), step_.rate1());
     const double slope = std::fabs(rate);
@@ -44,7 +44,7 @@ double EventEngine<X, single>::rate_of_tie(std::size_t i)
     if (!(std::fabs(g) <= 2 * slope * reach)) return 0;
     // A touch has a rate there that is itself no more than rounding.
     const double rate0 = rate_at(step_.time(0), step_.x0(), step_.rate0());
-    const double g0 = bank_[i].from > 0 ? g - h * (rate0 + rate) / 2 : bank_.g0(i);
+    const double g0 = guards_[i].from > 0 ? g - h * (rate0 + rate) / 2 : guards_.g0(i);
     const double curvature = (6 * (g0 - g) / h + 2 * rate0 + 4 * rate) / h;
     double noise = std::fabs(curvature) * ulps;
     X near = step_.x1();
@@ -80,13 +80,13 @@ bool EventEngine<X, single>::add_ties(bool found)
         }
     }
     bool added = false;
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
         if (!may_tie(i) || is_member(i)) continue;
         const double rate = rate_of_tie(i);
         if (rate == 0) continue;
         if (!added) search_.stay_at_end(step_);
         added = true;
-        if (bank_[i].acting) search_.join_at_end(step_, i, bank_[i].side, rate);
+        if (guards_[i].acting) search_.join_at_end(step_, i, guards_[i].side, rate);
     }
     return added;
 }
@@ -94,17 +94,17 @@ bool EventEngine<X, single>::add_ties(bool found)
 template <class X, bool single>
 void EventEngine<X, single>::note_ties()
 {
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        GuardRecord& record = bank_[i];
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        GuardRecord& record = guards_[i];
         if (record.acting || !may_tie(i)) continue;
         const double rate = rate_of_tie(i);
         if (rate == 0) continue;
-        record.noted.band = 2 * std::fabs(bank_.g1(i));
+        record.noted.tolerance = 2 * std::fabs(guards_.g1(i));
         const Side side = record.side;
         if (counts_at_set(i)) {
-            search_.note_at_set(bank_, i, side, rate);
+            search_.note_at_set(guards_, i, side, rate);
         } else {
-            bank_.arm(i, opposite(side));
+            guards_.arm(i, opposite(side));
         }
     }
 }

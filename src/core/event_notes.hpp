@@ -8,21 +8,21 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline void EventSearch<X, single>::note_crossings(const CurrentStep& step, Bank& bank,
+inline void EventSearch<X, single>::note_crossings(const CurrentStep& step, Guards& guards,
                                                    std::size_t i, const GuardSample& end,
                                                    std::uint64_t& calls)
 {
-    GuardRecord& record = bank[i];
-    const auto guard = bank.view(i, step.mode(), calls);
+    GuardRecord& record = guards[i];
+    const auto guard = guards.view(i, step.mode(), calls);
     Probe probe(guard, step, space_, record.info.boolean ? Path::restep : Path::dense);
     int stalled = 0;
     Creep creep(step.h());
     for (int round = 0; round < most_rounds; ++round) {
-        Watch watch = bank.watch(i, step, end);
-        Finding finding = next_finding(probe, watch, bank, i);
+        Watch watch = guards.watch(i, step, end);
+        Finding finding = next_finding(probe, watch, guards, i);
         if (finding.touch) continue;
         if (!finding.hit) return;
-        const Location where = locate_first(probe, watch, bank, finding).value();
+        const Location where = locate_first(probe, watch, guards, finding).value();
         const Side side = opposite(finding.side);
         bool counted = true;
         if (guard.system()->enabled_at) {
@@ -36,7 +36,7 @@ inline void EventSearch<X, single>::note_crossings(const CurrentStep& step, Bank
         }
         const bool stays = record.from > 0 && !(where.root > record.from);
         const bool creeps = creep.is_too_long(record.from, where.root);
-        pass(bank, i, side, where, probe);
+        pass(guards, i, side, where, probe);
         if (stays && ++stalled > 8) {  // noise around a flat root
             record.next = side_of(end.value);
             return;
@@ -47,31 +47,31 @@ inline void EventSearch<X, single>::note_crossings(const CurrentStep& step, Bank
                 record.next = side_of(end.value);
                 return;
             }
-            pass_behind(bank, i, side, behind, probe);
+            pass_behind(guards, i, side, behind, probe);
         }
     }
 }
 
 template <class X, bool single>
-inline void EventSearch<X, single>::pass(const CurrentStep& step, Bank& bank, std::size_t i,
+inline void EventSearch<X, single>::pass(const CurrentStep& step, Guards& guards, std::size_t i,
                                          std::uint64_t& calls)
 {
-    const auto guard = bank.view(i, step.mode(), calls);
+    const auto guard = guards.view(i, step.mode(), calls);
     Probe probe(guard, step, space_);
     const auto hit =
         std::find_if(hits_.begin(), hits_.end(), [i](const Hit& each) { return each.guard == i; });
     if (hit == hits_.end()) return;
     const Side side = opposite(hit->side);
-    const double from = bank[i].from;
-    pass(bank, i, side, hit->where, probe);
+    const double from = guards[i].from;
+    pass(guards, i, side, hit->where, probe);
     if (!creep_) creep_.emplace(step.h());
     if (!creep_->is_too_long(from, hit->where.root)) return;
     const double behind = creep_->behind(hit->where.root);
     if (behind < step.h()) {
-        pass_behind(bank, i, side, behind, probe);
+        pass_behind(guards, i, side, behind, probe);
     } else {
-        const Side end = side_of(bank.end(i, step.h()).value);
-        bank.go_on_from(i, end, away(end, step.h()));
+        const Side end = side_of(guards.end(i, step.h()).value);
+        guards.go_on_from(i, end, away(end, step.h()));
     }
 }
 

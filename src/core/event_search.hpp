@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "core/event_hit.hpp"
-#include "core/guard_bank.hpp"
+#include "core/guard_table.hpp"
 #include "core/step.hpp"
 #include "core/step_cover.hpp"
 #include "core/tolerances.hpp"
@@ -34,7 +34,7 @@ namespace ricochet::detail {
 template <class X, bool single>
 class EventSearch {
     using CurrentStep = Step<X>;
-    using Bank = GuardBank<X, single>;
+    using Guards = GuardTable<X, single>;
     using Probe = StepProbe<CoreGuard<X>, Step<X>>;
 
 public:
@@ -95,46 +95,47 @@ public:
     [[nodiscard]] StepCover<X, single>& cover() noexcept { return cover_; }
 
     /// What the bounds of guard i tell of the current step, at whose ends it has these values.
-    [[nodiscard]] Covered cover(const CurrentStep& step, const Bank& bank, std::size_t i,
+    [[nodiscard]] Covered cover(const CurrentStep& step, const Guards& guards, std::size_t i,
                                 double start, double end, std::uint64_t& calls)
     {
-        const auto guard = bank.view(i, step.mode(), calls);
+        const auto guard = guards.view(i, step.mode(), calls);
         const GuardSample from{.s = 0, .value = start}, to{.s = step.h(), .value = end};
-        return cover_.first_event(step, bank, guard, bank[i].side, from, from, to);
+        return cover_.first_event(step, guards, guard, guards[i].side, from, from, to);
     }
 
     /// What enclosures of guard i tell of the current step. @param interval  [s] length of the
     /// first part that is tried; 0: the whole step
-    [[nodiscard]] Covered cover_by_tubes(const CurrentStep& step, const Bank& bank, std::size_t i,
-                                         double interval, Statistics& counts)
+    [[nodiscard]] Covered cover_by_tubes(const CurrentStep& step, const Guards& guards,
+                                         std::size_t i, double interval, Statistics& counts)
     {
         constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
-        const auto guard = bank.view(i, step.mode(), counts.guard_calls);
+        const auto guard = guards.view(i, step.mode(), counts.guard_calls);
         const GuardSample from{.s = 0, .value = unknown}, to{.s = step.h(), .value = unknown};
         cover_.try_first(interval);
-        return cover_.first_event(step, bank, guard, bank[i].side, from, from, to);
+        return cover_.first_event(step, guards, guard, guards[i].side, from, from, to);
     }
 
     /// Whether the bounds of guard i, which ends the step on its side, show an event inside.
-    [[nodiscard]] bool bounds_show_event(const CurrentStep& step, const Bank& bank, std::size_t i,
-                                         std::uint64_t& calls)
+    [[nodiscard]] bool bounds_show_event(const CurrentStep& step, const Guards& guards,
+                                         std::size_t i, std::uint64_t& calls)
     {
-        const GuardSample end = bank.end(i, step.h());
-        if (bank[i].info.boolean) return cover_.in_use() && changes_inside(step, bank, i, calls);
-        if (!cover_.covers(bank[i]) || !(sign_of(bank[i].side) * end.value > 0)) return false;
-        const auto guard = bank.view(i, step.mode(), calls);
+        const GuardSample end = guards.end(i, step.h());
+        if (guards[i].info.boolean)
+            return cover_.in_use() && changes_inside(step, guards, i, calls);
+        if (!cover_.covers(guards[i]) || !(sign_of(guards[i].side) * end.value > 0)) return false;
+        const auto guard = guards.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
-        return cover_between(probe, bank, bank[i].side, bank.start(i), end).leaves;
+        return cover_between(probe, guards, guards[i].side, guards.start(i), end).leaves;
     }
 
     /// Whether a guard of which only the sign has a meaning has left its side inside the step.
-    [[nodiscard]] bool changes_inside(const CurrentStep& step, const Bank& bank, std::size_t i,
+    [[nodiscard]] bool changes_inside(const CurrentStep& step, const Guards& guards, std::size_t i,
                                       std::uint64_t& calls)
     {
-        const auto guard = bank.view(i, step.mode(), calls);
+        const auto guard = guards.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (const double u : signs_.places_screened(step.h())) {
-            if (has_left(bank[i].side, probe.dense_value(u * step.h()).value)) return true;
+            if (has_left(guards[i].side, probe.dense_value(u * step.h()).value)) return true;
         }
         return false;
     }
@@ -181,7 +182,7 @@ public:
 
     /// Finds the first set of acting guards in the step; a time event that is due at
     /// its end belongs to it if it lies in the window. False: none.
-    [[nodiscard]] bool find_set(const CurrentStep& step, Bank& bank, bool time_event_due,
+    [[nodiscard]] bool find_set(const CurrentStep& step, Guards& guards, bool time_event_due,
                                 std::uint64_t& calls)
     {
         hits_.clear();
@@ -191,20 +192,20 @@ public:
         change_.known = false;
         std::size_t suspects = 0;
         std::size_t last = 0;
-        for (const std::size_t i : bank.suspects()) {
-            if (!bank[i].acting || !bank.still_suspicious(i, step.h())) continue;
+        for (const std::size_t i : guards.suspects()) {
+            if (!guards[i].acting || !guards.still_suspicious(i, step.h())) continue;
             ++suspects;
             last = i;
         }
         if (suspects == 0) return false;
-        if (suspects == 1 && bank.has_series(last) && find_by_series(step, bank, last, calls)) {
+        if (suspects == 1 && guards.has_series(last) && find_by_series(step, guards, last, calls)) {
             settle_place(step, time_event_due);
             return true;
         }
-        bank.complete_rates(step, calls);
+        guards.complete_rates(step, calls);
         if (suspects == 1) {
-            if (!find_only(step, bank, last, calls)) return false;
-        } else if (!find_among(step, bank, calls)) {
+            if (!find_only(step, guards, last, calls)) return false;
+        } else if (!find_among(step, guards, calls)) {
             return false;
         }
         settle_place(step, time_event_due);
@@ -215,14 +216,14 @@ public:
     /// in floating point, so that a reset that asks for the condition of its event finds it true:
     /// to the root predicted by the slopes of those that have not, at most as far as the bracket
     /// within which they were located. False: nowhere, and nothing is moved.
-    bool meet_conditions(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
+    bool meet_conditions(const CurrentStep& step, Guards& guards, std::uint64_t& calls);
 
     /// The same for a set whose time is given: only the state is moved.
-    bool meet_conditions_on_time(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
+    bool meet_conditions_on_time(const CurrentStep& step, Guards& guards, std::uint64_t& calls);
 
     /// Adds the crossings and touches of a recorded guard, up to the sample `end`.
-    void note_crossings(const CurrentStep& step, Bank& bank, std::size_t i, const GuardSample& end,
-                        std::uint64_t& calls);
+    void note_crossings(const CurrentStep& step, Guards& guards, std::size_t i,
+                        const GuardSample& end, std::uint64_t& calls);
 
     /// Adds a located crossing of an acting guard that did not change anything; `keeps_state` if
     /// its state will be recorded.
@@ -235,14 +236,14 @@ public:
     }
 
     /// Continues the search after a crossing that changes nothing.
-    void pass(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls);
+    void pass(const CurrentStep& step, Guards& guards, std::size_t i, std::uint64_t& calls);
 
     /// A guard that leaves its plateau in the step on the side away from the awaited one is
     /// armed on the awaited side from there on.
-    void end_plateau(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
+    void end_plateau(const CurrentStep& step, Guards& guards, std::size_t i, std::uint64_t& calls)
     {
-        const Side awaited = bank[i].awaited;
-        const auto guard = bank.view(i, step.mode(), calls);
+        const Side awaited = guards[i].awaited;
+        const auto guard = guards.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         double on = 0;
         double off = step.h();
@@ -251,17 +252,17 @@ public:
             if (!(middle > on && middle < off)) break;
             (side_of(probe.value(middle).value) == opposite(awaited) ? off : on) = middle;
         }
-        bank.go_on_from(i, awaited, away(awaited, on));
+        guards.go_on_from(i, awaited, away(awaited, on));
     }
 
     /// The value and rate of a guard where the set happens.
-    [[nodiscard]] GuardSample sample_at_set(const CurrentStep& step, Bank& bank, std::size_t i,
+    [[nodiscard]] GuardSample sample_at_set(const CurrentStep& step, Guards& guards, std::size_t i,
                                             std::uint64_t& calls)
     {
-        const auto guard = bank.view(i, step.mode(), calls);
+        const auto guard = guards.view(i, step.mode(), calls);
         const double t = step.time(at_);
         GuardSample sample{.s = at_, .value = guard.value(t, before_)};
-        if (!bank[i].info.boolean) {
+        if (!guards[i].info.boolean) {
             if (!rated_at_set_) step.flow(at_, before_, rate_);
             rated_at_set_ = true;
             sample.rate = guard.rate(t, before_, rate_, step.h());
@@ -271,7 +272,7 @@ public:
 
     /// A state on the line along the flow through the set at which guard i is strictly beyond its
     /// surface, at most 4 ulp of the time past its bracket; returns its time, NaN if there is none.
-    [[nodiscard]] double go_beyond(const CurrentStep& step, Bank& bank, std::size_t i, X& x,
+    [[nodiscard]] double go_beyond(const CurrentStep& step, Guards& guards, std::size_t i, X& x,
                                    std::uint64_t& calls);
 
     /// What rounding has taken from component c of the state at the set, where it is known.
@@ -336,13 +337,13 @@ public:
     }
     /// Whether guard i is a candidate that was still so far from its surface at the end of the
     /// window that its event is another one.
-    [[nodiscard]] bool comes_later(const CurrentStep& step, const Bank& bank,
+    [[nodiscard]] bool comes_later(const CurrentStep& step, const Guards& guards,
                                    std::size_t i) noexcept
     {
         for (const Hit& hit : hits_) {
             if (hit.guard != i) continue;
             // Its rate there is at most a few times its size over the step.
-            const double moves = bank.scale(i, step.h()) / step.h() * reach_of(step, at_);
+            const double moves = guards.scale(i, step.h()) / step.h() * reach_of(step, at_);
             return !hit.departed && !hit.located && std::fabs(hit.value) > 64 * moves;
         }
         return false;
@@ -350,24 +351,24 @@ public:
 
     /// Whether a guard crosses its surface with the set, that is, lies within rounding of it
     /// there. `sample` holds the rate of the guard.
-    [[nodiscard]] bool crosses_with_set(const CurrentStep& step, const Bank& bank, std::size_t i,
-                                        const GuardSample& sample) const
+    [[nodiscard]] bool crosses_with_set(const CurrentStep& step, const Guards& guards,
+                                        std::size_t i, const GuardSample& sample) const
     {
         const double reach = reach_of(step, sample.s);
         // A guard that acts must be located in the set; one that is only recorded may be as far
         // from its surface as the rounding of its largest values.
-        const double band = bank[i].acting ? 0 : bank.touch(i, step.h());
-        return std::fabs(sample.value) <= std::max(std::fabs(sample.rate) * reach, band);
+        const double tolerance = guards[i].acting ? 0 : guards.touch(i, step.h());
+        return std::fabs(sample.value) <= std::max(std::fabs(sample.rate) * reach, tolerance);
     }
 
     /// Adds a crossing that happens with the set.
-    void note_at_set(Bank& bank, std::size_t i, Side side, double slope)
+    void note_at_set(Guards& guards, std::size_t i, Side side, double slope)
     {
         notes_.push_back({.guard = i,
                           .kind = EventKind::crossing,
                           .side = side,
                           .where = {.lo = at_, .hi = at_, .root = at_, .slope = slope}});
-        bank.arm(i, opposite(side));
+        guards.arm(i, opposite(side));
     }
 
     /// Drops the crossings beyond the offset s, and sorts the rest by time.
@@ -429,26 +430,29 @@ private:
 
     /// Next event of the guard in the interval. A touch is added, and a clear interval
     /// determines on which side the guard is at its end.
-    [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Bank& bank, std::size_t i)
+    [[nodiscard]] Finding next_finding(Probe& probe, Watch& watch, Guards& guards, std::size_t i)
     {
-        if (is_over(probe, watch, bank[i])) return Finding::clear(evidence_);
-        if (bank[i].info.boolean) return heed(bank, i, watch, next_change(probe, watch, bank, i));
-        if (bank.has_series(i)) return heed(bank, i, watch, next_on_series(probe, watch, bank, i));
-        if (cover_.covers(bank[i]))
-            return heed(bank, i, watch, next_under_bound(probe, watch, bank));
-        if (!bank.checked()) return heed(bank, i, watch, next_by_own_size(probe, watch, bank, i));
-        return heed(bank, i, watch, next_in_parts(probe, watch, bank, i));
+        if (is_over(probe, watch, guards[i])) return Finding::clear(evidence_);
+        if (guards[i].info.boolean)
+            return heed(guards, i, watch, next_change(probe, watch, guards, i));
+        if (guards.has_series(i))
+            return heed(guards, i, watch, next_on_series(probe, watch, guards, i));
+        if (cover_.covers(guards[i]))
+            return heed(guards, i, watch, next_under_bound(probe, watch, guards));
+        if (!guards.checked())
+            return heed(guards, i, watch, next_by_own_size(probe, watch, guards, i));
+        return heed(guards, i, watch, next_in_parts(probe, watch, guards, i));
     }
 
     /// The next event in the interval, from the guard's power series. If the series is not sure,
     /// or contradicts the values at the ends, the detector is asked.
-    [[nodiscard]] Finding next_on_series(Probe& probe, Watch& watch, const Bank& bank,
+    [[nodiscard]] Finding next_on_series(Probe& probe, Watch& watch, const Guards& guards,
                                          std::size_t i);
 
     /// The next event of a guard of which only the sign has a meaning, from its values at the
     /// places inside the step at which it is evaluated.
-    [[nodiscard, gnu::noinline]] Finding next_change(Probe& probe, Watch& watch, const Bank& bank,
-                                                     std::size_t i) const
+    [[nodiscard, gnu::noinline]] Finding next_change(Probe& probe, Watch& watch,
+                                                     const Guards& guards, std::size_t i) const
     {
         const GuardSample start = watch.start, end = watch.end;
         const double h = probe.step().h();
@@ -465,9 +469,9 @@ private:
         };
         // The bits of an event must not depend on where else the guard has been evaluated.
         const bool whole = resolution_.is_finest();
-        for (const double u : signs_.places(h, bank.checked_everywhere())) {
+        for (const double u : signs_.places(h, guards.checked_everywhere())) {
             if (!(u * h > start.s && u * h < end.s)) continue;
-            const GuardSample known = bank.known_at(u, i, h);
+            const GuardSample known = guards.known_at(u, i, h);
             if (add(known.s > 0 ? known : probe.dense_value(u * h)) && !whole) break;
         }
         add(end);
@@ -482,22 +486,22 @@ private:
     }
 
     /// Finding of the detector; where it finds no departure, the bounds of the guard are asked.
-    [[nodiscard]] Finding next_under_bound(Probe& probe, Watch& watch, const Bank& bank)
+    [[nodiscard]] Finding next_under_bound(Probe& probe, Watch& watch, const Guards& guards)
     {
         const Finding finding = finders_->examine(probe, watch);
         if (finding.hit) return finding;
-        const Covered covered = cover_between(probe, bank, watch.side, watch.start, watch.end);
+        const Covered covered = cover_between(probe, guards, watch.side, watch.start, watch.end);
         const bool touches_first = finding.touch && finding.hi.s <= covered.lo;
         if (!covered.leaves || touches_first) return finding;
         return departure(probe, watch, covered);
     }
 
     /// What the bounds of a guard tell of an interval.
-    [[nodiscard]] Covered cover_between(const Probe& probe, const Bank& bank, Side side,
+    [[nodiscard]] Covered cover_between(const Probe& probe, const Guards& guards, Side side,
                                         const GuardSample& start, const GuardSample& end)
     {
         if (start.value == 0 && end.value == 0) return {.proved = false};  // it may rest there
-        return cover_.first_event(probe.step(), bank, probe.guard(), side, start, start, end);
+        return cover_.first_event(probe.step(), guards, probe.guard(), side, start, start, end);
     }
 
     [[nodiscard]] static Finding departure(Probe& probe, const Watch& watch, const Covered& covered)
@@ -509,11 +513,12 @@ private:
 
     /// The departure that the bounds of the guard show before the end of one that the detector has
     /// found.
-    [[nodiscard]] std::optional<Finding> earlier(Probe& probe, const Watch& watch, const Bank& bank,
-                                                 const Finding& finding, const GuardSample& end)
+    [[nodiscard]] std::optional<Finding> earlier(Probe& probe, const Watch& watch,
+                                                 const Guards& guards, const Finding& finding,
+                                                 const GuardSample& end)
     {
-        if (finding.late || !cover_.covers(bank[probe.guard().which()])) return std::nullopt;
-        const Covered covered = cover_.first_event(probe.step(), bank, probe.guard(), watch.side,
+        if (finding.late || !cover_.covers(guards[probe.guard().which()])) return std::nullopt;
+        const Covered covered = cover_.first_event(probe.step(), guards, probe.guard(), watch.side,
                                                    watch.start, finding.lo, end);
         if (!covered.leaves || !(covered.hi < end.s)) return std::nullopt;
         return departure(probe, watch, covered);
@@ -521,10 +526,10 @@ private:
 
     /// The finding of one candidate among several, or the earlier departure that its bounds show.
     /// (The candidate with the first root is located first.)
-    [[nodiscard]] Finding first_under_bound(Probe& probe, const Watch& watch, const Bank& bank,
+    [[nodiscard]] Finding first_under_bound(Probe& probe, const Watch& watch, const Guards& guards,
                                             const Finding& finding)
     {
-        const auto before = earlier(probe, watch, bank, finding, finding.hi);
+        const auto before = earlier(probe, watch, guards, finding, finding.hi);
         return before && before->hi.s < guess(finding) ? *before : finding;
     }
 
@@ -536,12 +541,12 @@ private:
 
     /// Finding of the detector. Some judge by the largest value of the guard so far: one that has
     /// decayed since and changes its side is judged by its values in this step.
-    [[nodiscard]] Finding next_by_own_size(Probe& probe, Watch& watch, const Bank& bank,
+    [[nodiscard]] Finding next_by_own_size(Probe& probe, Watch& watch, const Guards& guards,
                                            std::size_t i) const
     {
         const Watch given = watch;
         const Finding finding = finders_->examine(probe, watch);
-        const double own = bank.touch_of(i, given.scale);
+        const double own = guards.touch_of(i, given.scale);
         if (finding.hit || !(own < 0.5 * given.touch)) return finding;
         if (!has_left(given.side, given.end.value)) return finding;
         const double rounded = std::max(own, probe.blur(given.end.s));
@@ -553,9 +558,10 @@ private:
     }
 
     /// Finding of the detector on the parts of an interval, up to the first that is not clear.
-    [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Bank& bank, std::size_t i)
+    [[nodiscard]] Finding next_in_parts(Probe& probe, Watch& watch, const Guards& guards,
+                                        std::size_t i)
     {
-        parts_.resolve(probe, i, watch, bank[i].info.touch, bank.checked_everywhere());
+        parts_.resolve(probe, i, watch, guards[i].info.touch, guards.checked_everywhere());
         refined_ = refined_ || parts_.divided();
         unresolved_ = unresolved_ || parts_.unresolved();
         const Watch whole = watch;
@@ -564,7 +570,7 @@ private:
                            whole.start.s == parts_.whole().start.s;
         while (const GuardSample* node = parts_.next(watch.start.s, end.s)) {
             watch.end = *node;
-            judge_by_its_own_size(watch, bank, i);
+            judge_by_its_own_size(watch, guards, i);
             Finding finding = finders_->examine(probe, watch);
             if (plain && finding.hit && finding.hi.s == node->s && stays_beyond(whole, *node)) {
                 finding.lo = whole.start;
@@ -575,20 +581,20 @@ private:
             watch.start = *node;
         }
         watch.end = end;
-        if (parts_.divided()) judge_by_its_own_size(watch, bank, i);
+        if (parts_.divided()) judge_by_its_own_size(watch, guards, i);
         return finders_->examine(probe, watch);
     }
 
     /// Takes the rounding of a guard that decays within the step from its size in this part of the
     /// step.
-    static void judge_by_its_own_size(Watch& watch, const Bank& bank, std::size_t i) noexcept
+    static void judge_by_its_own_size(Watch& watch, const Guards& guards, std::size_t i) noexcept
     {
         const double width = watch.end.s - watch.start.s;
         const CubicCheck look(watch.start.value, watch.start.rate, watch.end.value, watch.end.rate,
                               width);
         if (!std::isfinite(look.size())) return;
         watch.scale = look.size();
-        watch.touch = bank.touch_of(i, look.size());
+        watch.touch = guards.touch_of(i, look.size());
     }
 
     /// Finding when no further evaluation can help: a remainder after an event at the end
@@ -652,44 +658,44 @@ private:
         }
     }
 
-    [[nodiscard]] Finding heed(Bank& bank, std::size_t i, const Watch& watch,
+    [[nodiscard]] Finding heed(Guards& guards, std::size_t i, const Watch& watch,
                                const Finding& finding)
     {
         if (finding.touch) {
-            touched(bank, i, finding.side, finding.hi.s);
+            touched(guards, i, finding.side, finding.hi.s);
         } else if (!finding.hit) {
             evidence_ = std::max(evidence_, finding.evidence);
-            bank[i].next = watch.side_after;
+            guards[i].next = watch.side_after;
         }
         return finding;
     }
 
     /// Locates a departure; nothing where the step's own map has none, as `StepProbe::agree_on`.
-    [[nodiscard]] std::optional<Location> find(Probe& probe, Finding finding, const Bank& bank,
+    [[nodiscard]] std::optional<Location> find(Probe& probe, Finding finding, const Guards& guards,
                                                std::size_t i)
     {
         if (finding.late) {
             return Location{.slope = finding.lo.rate, .error = std::fabs(finding.lo.value)};
         }
         const double tolerance = std::max(resolution_.tolerance(probe.step().time(finding.hi.s)),
-                                          bank.unresolved(i, probe.step().h()));
-        if (bank[i].info.boolean) return find_change(probe, finding, bank, i, tolerance);
-        if (!probe.agree_on(finding.lo, finding.hi, bank.start(i), bank[i].side)) {
+                                          guards.unresolved(i, probe.step().h()));
+        if (guards[i].info.boolean) return find_change(probe, finding, guards, i, tolerance);
+        if (!probe.agree_on(finding.lo, finding.hi, guards.start(i), guards[i].side)) {
             return std::nullopt;
         }
-        const double departure = bank.departure(i, probe.step().h());
-        if (bank.is_cubic(i, departure)) probe.take_as_cubic();
+        const double departure = guards.departure(i, probe.step().h());
+        if (guards.is_cubic(i, departure)) probe.take_as_cubic();
         return finders_->locate(probe, finding.lo, finding.hi, tolerance);
     }
 
     /// The same for a guard of which only the sign has a meaning. Of the ends of the bracket only
     /// those that the bisection leaves have to agree with the step's own map.
     [[nodiscard, gnu::noinline]] std::optional<Location> find_change(Probe& probe, Finding finding,
-                                                                     const Bank& bank,
+                                                                     const Guards& guards,
                                                                      std::size_t i,
                                                                      double tolerance)
     {
-        const GuardSample start = bank.start(i);
+        const GuardSample start = guards.start(i);
         GuardSample lo = finding.lo, hi = finding.hi;
         bisect(probe, lo, hi, tolerance);
         const bool lo_agrees =
@@ -697,7 +703,7 @@ private:
         const bool hi_agrees =
             hi.s != finding.hi.s || hi.s == probe.h() || probe.has_left(probe.value(hi.s));
         if (!lo_agrees || !hi_agrees) {
-            if (!probe.agree_on(finding.lo, finding.hi, start, bank[i].side)) return std::nullopt;
+            if (!probe.agree_on(finding.lo, finding.hi, start, guards[i].side)) return std::nullopt;
             lo = finding.lo;
             hi = finding.hi;
             bisect(probe, lo, hi, tolerance);
@@ -708,23 +714,23 @@ private:
     }
 
     /// Continues behind a departure that the step's own map does not have, on the map's side.
-    [[gnu::noinline]] static void go_behind(Probe& probe, const Finding& finding, Bank& bank,
+    [[gnu::noinline]] static void go_behind(Probe& probe, const Finding& finding, Guards& guards,
                                             std::size_t i)
     {
         GuardSample start = probe.value_and_rate(finding.hi.s);
         const Side side =
             has_left(finding.side, start.value) ? opposite(finding.side) : finding.side;
         if (start.value == 0) start.value = away(side, start.s).value;
-        bank.go_on_from(i, side, start);
+        guards.go_on_from(i, side, start);
     }
 
-    [[gnu::noinline]] void touched(Bank& bank, std::size_t i, Side side, double s)
+    [[gnu::noinline]] void touched(Guards& guards, std::size_t i, Side side, double s)
     {
         notes_.push_back({.guard = i,
                           .kind = EventKind::touch,
                           .side = side,
                           .where = {.lo = s, .hi = s, .root = s, .slope = 0}});
-        bank.go_on_from(i, side, away(side, s));
+        guards.go_on_from(i, side, away(side, s));
     }
 
     /// A sample at s of a guard that is on its surface, within rounding, and heads for `side`.
@@ -734,23 +740,23 @@ private:
         return {.s = s, .value = least, .rate = least};
     }
 
-    void pass(Bank& bank, std::size_t i, Side side, const Location& where, Probe& probe)
+    void pass(Guards& guards, std::size_t i, Side side, const Location& where, Probe& probe)
     {
         GuardSample start = away(side, where.root);
-        if (finders_->detector.uses_rates && !bank[i].info.boolean) {
+        if (finders_->detector.uses_rates && !guards[i].info.boolean) {
             start.rate =
                 std::isfinite(where.slope) ? where.slope : probe.value_and_rate(where.root).rate;
             if (start.rate == 0) start.rate = start.value;
         }
-        bank.go_on_from(i, side, start);
-        bank[i].slope = where.slope;
+        guards.go_on_from(i, side, start);
+        guards[i].slope = where.slope;
     }
 
     /// Continues the search at the offset `behind` an event, on the side of the guard there.
-    void pass_behind(Bank& bank, std::size_t i, Side side, double behind, Probe& probe)
+    void pass_behind(Guards& guards, std::size_t i, Side side, double behind, Probe& probe)
     {
         const Side there = side_of(probe.value(behind).value);
-        pass(bank, i, there == Side::plateau ? side : there,
+        pass(guards, i, there == Side::plateau ? side : there,
              {.lo = behind,
               .hi = behind,
               .root = behind,
@@ -759,15 +765,15 @@ private:
     }
 
     /// Whether guard i leaves its side once in the step, as plainly as its samples can show.
-    /// @param e  `GuardBank::departure`
-    [[nodiscard, gnu::always_inline]] bool goes_plainly(const Bank& bank, std::size_t i, double h,
-                                                        double e) const
+    /// @param e  `GuardTable::departure`
+    [[nodiscard, gnu::always_inline]] bool goes_plainly(const Guards& guards, std::size_t i,
+                                                        double h, double e) const
     {
-        const Side side = bank[i].side;
-        return bank[i].from == 0 && !bank[i].info.boolean && counts(side, bank[i].info.crossing) &&
-               bank.is_plain(i, h, e) &&
-               finders_->leaves_plainly(sign_of(side), bank.start(i), bank.end(i, h),
-                                        bank.touch(i, h));
+        const Side side = guards[i].side;
+        return guards[i].from == 0 && !guards[i].info.boolean &&
+               counts(side, guards[i].info.crossing) && guards.is_plain(i, h, e) &&
+               finders_->leaves_plainly(sign_of(side), guards.start(i), guards.end(i, h),
+                                        guards.touch(i, h));
     }
 
     void add_hit(std::size_t i, const Finding& finding) noexcept
@@ -780,29 +786,30 @@ private:
     }
 
     /// Adds a hit of an acting guard, and its touches before it.
-    void examine(const CurrentStep& step, Bank& bank, std::size_t i, std::uint64_t& calls)
+    void examine(const CurrentStep& step, Guards& guards, std::size_t i, std::uint64_t& calls)
     {
-        const bool covered = cover_.covers(bank[i]);
-        if (!covered && goes_plainly(bank, i, step.h(), bank.departure(i, step.h()))) {
-            return add_hit(i, Finding::leaving(bank[i].side, bank.start(i), bank.end(i, step.h())));
+        const bool covered = cover_.covers(guards[i]);
+        if (!covered && goes_plainly(guards, i, step.h(), guards.departure(i, step.h()))) {
+            return add_hit(
+                i, Finding::leaving(guards[i].side, guards.start(i), guards.end(i, step.h())));
         }
-        const auto guard = bank.view(i, step.mode(), calls);
+        const auto guard = guards.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {
-            Watch watch = bank.watch(i, step, bank.end(i, step.h()));
-            const Finding finding = next_finding(probe, watch, bank, i);
+            Watch watch = guards.watch(i, step, guards.end(i, step.h()));
+            const Finding finding = next_finding(probe, watch, guards, i);
             if (finding.touch) continue;
             if (!finding.hit) return;
-            if (bank[i].from > 0 && !finding.late) {
+            if (guards[i].from > 0 && !finding.late) {
                 probe.watch(finding.side);
                 GuardSample lo = finding.lo;
-                if (!probe.agree_on(lo, finding.hi, bank.start(i), bank[i].side)) {
-                    go_behind(probe, finding, bank, i);
+                if (!probe.agree_on(lo, finding.hi, guards.start(i), guards[i].side)) {
+                    go_behind(probe, finding, guards, i);
                     continue;
                 }
             }
             late_ = late_ || finding.late;
-            return add_hit(i, first_under_bound(probe, watch, bank, finding));
+            return add_hit(i, first_under_bound(probe, watch, guards, finding));
         }
     }
 
@@ -821,26 +828,26 @@ private:
 
     /// Locates a departure, or the one before it that the bounds of the guard show.
     [[nodiscard]] std::optional<Location> locate_first(Probe& probe, const Watch& watch,
-                                                       const Bank& bank, Finding& finding)
+                                                       const Guards& guards, Finding& finding)
     {
         for (;;) {
             probe.watch(finding.side);
-            const auto where = find(probe, finding, bank, probe.guard().which());
+            const auto where = find(probe, finding, guards, probe.guard().which());
             if (!where) return where;
             const GuardSample root{.s = where->root, .value = 0, .rate = where->slope};
-            const auto before = earlier(probe, watch, bank, finding, root);
+            const auto before = earlier(probe, watch, guards, finding, root);
             if (!before) return where;
             finding = *before;
         }
     }
 
     /// Locates a candidate, and keeps the state at its root if it is the first so far.
-    void locate(const CurrentStep& step, Bank& bank, Hit& hit, std::uint64_t& calls)
+    void locate(const CurrentStep& step, Guards& guards, Hit& hit, std::uint64_t& calls)
     {
-        const auto guard = bank.view(hit.guard, step.mode(), calls);
+        const auto guard = guards.view(hit.guard, step.mode(), calls);
         Probe probe(guard, step, space_);
-        const Watch watch = bank.watch(hit.guard, step, bank.end(hit.guard, step.h()));
-        hit.where = locate_first(probe, watch, bank, hit.finding).value();
+        const Watch watch = guards.watch(hit.guard, step, guards.end(hit.guard, step.h()));
+        hit.where = locate_first(probe, watch, guards, hit.finding).value();
         hit.located = true;
         if (first_ && first_->where.root <= hit.where.root) {
             // Which of two equal roots is kept must not matter.
@@ -865,45 +872,45 @@ private:
     /// First set if guard i is the only one that needs a check. The code that nearly
     /// every event needs is inlined here: handing samples from one function to another
     /// through memory takes as long as the location itself.
-    [[gnu::flatten]] bool find_only(const CurrentStep& step, Bank& bank, std::size_t i,
+    [[gnu::flatten]] bool find_only(const CurrentStep& step, Guards& guards, std::size_t i,
                                     std::uint64_t& calls)
     {
-        const auto guard = bank.view(i, step.mode(), calls);
+        const auto guard = guards.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
-        const Side side = bank[i].side;
-        const GuardSample start = bank.start(i), end = bank.end(i, step.h());
-        const double departure = bank.departure(i, step.h());
-        if (!cover_.covers(bank[i]) && goes_plainly(bank, i, step.h(), departure)) {
+        const Side side = guards[i].side;
+        const GuardSample start = guards.start(i), end = guards.end(i, step.h());
+        const double departure = guards.departure(i, step.h());
+        if (!cover_.covers(guards[i]) && goes_plainly(guards, i, step.h(), departure)) {
             probe.watch(side);
-            if (bank.is_cubic(i, departure)) probe.take_as_cubic();
-            const double tolerance =
-                std::max(resolution_.tolerance(step.time(step.h())), bank.unresolved(i, step.h()));
+            if (guards.is_cubic(i, departure)) probe.take_as_cubic();
+            const double tolerance = std::max(resolution_.tolerance(step.time(step.h())),
+                                              guards.unresolved(i, step.h()));
             const Location where = finders_->locate(probe, start, end, tolerance);
             keep_only(i, side, where, probe.state_at(where));
             keep_line(probe, where);
             return true;
         }
-        return find_only_carefully(step, bank, i, calls);
+        return find_only_carefully(step, guards, i, calls);
     }
 
     /// As `find_only`, for a guard with a power series that determines its first departure.
-    [[nodiscard]] bool find_by_series(const CurrentStep& step, Bank& bank, std::size_t i,
+    [[nodiscard]] bool find_by_series(const CurrentStep& step, Guards& guards, std::size_t i,
                                       std::uint64_t& calls);
 
-    [[gnu::noinline]] bool find_only_carefully(const CurrentStep& step, Bank& bank, std::size_t i,
-                                               std::uint64_t& calls)
+    [[gnu::noinline]] bool find_only_carefully(const CurrentStep& step, Guards& guards,
+                                               std::size_t i, std::uint64_t& calls)
     {
-        const auto guard = bank.view(i, step.mode(), calls);
+        const auto guard = guards.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         for (int round = 0; round < most_rounds; ++round) {
-            Watch watch = bank.watch(i, step, bank.end(i, step.h()));
-            Finding finding = next_finding(probe, watch, bank, i);
+            Watch watch = guards.watch(i, step, guards.end(i, step.h()));
+            Finding finding = next_finding(probe, watch, guards, i);
             if (finding.touch) continue;
             if (!finding.hit) return false;
             late_ = finding.late;
-            std::optional<Location> where = locate_first(probe, watch, bank, finding);
+            std::optional<Location> where = locate_first(probe, watch, guards, finding);
             if (!where) {
-                go_behind(probe, finding, bank, i);
+                go_behind(probe, finding, guards, i);
                 continue;
             }
             keep_only(i, finding.side, *where, finding.late ? step.x0() : probe.state_at(*where));
@@ -934,14 +941,14 @@ private:
     }
 
     /// The first set among several candidates.
-    [[nodiscard]] bool find_among(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
+    [[nodiscard]] bool find_among(const CurrentStep& step, Guards& guards, std::uint64_t& calls);
 
     /// Locates candidates until every one that has left its side by the end of the
     /// window is located; the set is those that lie in the window.
-    void close_set(const CurrentStep& step, Bank& bank, std::uint64_t& calls);
+    void close_set(const CurrentStep& step, Guards& guards, std::uint64_t& calls);
 
     /// Finds out which of the candidates that are not located have left their sides by offset `at`.
-    void find_departed(const CurrentStep& step, Bank& bank, double at, std::uint64_t& calls);
+    void find_departed(const CurrentStep& step, Guards& guards, double at, std::uint64_t& calls);
 
     /// Computes the state at offset s, near the first root, for which it needs no repeat of the
     /// step if the motion is straight until there.
@@ -956,12 +963,12 @@ private:
     /// The longest time [s] after which a guard of the set that has not left its side at the state
     /// x reaches its surface there, at the offset `at`; 0 if there is none, NaN if it cannot be
     /// told.
-    [[nodiscard]] double lacks(const CurrentStep& step, Bank& bank, const X& x, const TwoSum& at,
-                               std::uint64_t& calls);
+    [[nodiscard]] double lacks(const CurrentStep& step, Guards& guards, const X& x,
+                               const TwoSum& at, std::uint64_t& calls);
 
     /// Whether every guard of the set has left its side at the state `space_.root`, which is
     /// `ahead` [s] behind the set; the set is moved there if so.
-    bool holds_ahead(const CurrentStep& step, Bank& bank, double ahead, std::uint64_t& calls);
+    bool holds_ahead(const CurrentStep& step, Guards& guards, double ahead, std::uint64_t& calls);
 
     /// Whether the only guard of the set is one whose bisection has ended at the set, so that its
     /// value there is `change_.at`.

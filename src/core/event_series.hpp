@@ -6,18 +6,18 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-Finding EventSearch<X, single>::next_on_series(Probe& probe, Watch& watch, const Bank& bank,
+Finding EventSearch<X, single>::next_on_series(Probe& probe, Watch& watch, const Guards& guards,
                                                std::size_t i)
 {
-    const Crossing crossing = bank[i].info.crossing;
+    const Crossing crossing = guards[i].info.crossing;
     const GuardSample end = watch.end;
     GuardSeries guard{
-        .terms = bank.series(),
+        .terms = guards.series(),
         .which = i,
         .h = probe.step().h(),
         .sign = sign_of(watch.side),
         .from_surface = watch.start.s > 0 || std::fabs(watch.start.value) <= watch.touch,
-        .touch = bank[i].info.touch};
+        .touch = guards[i].info.touch};
     const double ahead = guard.from_surface ? watch.start.rate : watch.start.value;
     if (!(guard.sign * ahead > 0)) return finders_->examine(probe, watch);
     constexpr int most_doubts = 8;  // with more, the series determines nothing about the rest
@@ -45,7 +45,7 @@ Finding EventSearch<X, single>::next_on_series(Probe& probe, Watch& watch, const
             watch.side = opposite(watch.side);
         } else if (!passes) {
             ++doubts;
-            judge_by_its_own_size(watch, bank, i);
+            judge_by_its_own_size(watch, guards, i);
             const Finding finding = finders_->examine(probe, watch);
             if (finding.hit || finding.touch) return finding;
             watch.side = watch.side_after;
@@ -80,17 +80,17 @@ std::optional<GuardSample> EventSearch<X, single>::turn_between(Probe& probe, co
 }
 
 template <class X, bool single>
-bool EventSearch<X, single>::find_by_series(const CurrentStep& step, Bank& bank, std::size_t i,
+bool EventSearch<X, single>::find_by_series(const CurrentStep& step, Guards& guards, std::size_t i,
                                             std::uint64_t& calls)
 {
-    const GuardRecord& record = bank[i];
+    const GuardRecord& record = guards[i];
     if (!resolution_.is_finest() || !finders_->locator.yields_to_series) return false;
     if (record.from > 0 || !counts(record.side, record.info.crossing)) return false;
     if (record.info.touch > 0) return false;
     SeriesCrossing crossing{.which = i,
                             .side = record.side,
-                            .end = bank.end(i, step.h()).value,
-                            .from_surface = bank.starts_on_surface(i)};
+                            .end = guards.end(i, step.h()).value,
+                            .from_surface = guards.starts_on_surface(i)};
     if (!has_left(crossing.side, crossing.end)) return false;
     const bool found = step.cross(crossing, space_.x);
     calls += crossing.calls;

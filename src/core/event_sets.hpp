@@ -9,15 +9,15 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline bool EventSearch<X, single>::find_among(const CurrentStep& step, Bank& bank,
+inline bool EventSearch<X, single>::find_among(const CurrentStep& step, Guards& guards,
                                                std::uint64_t& calls)
 {
-    for (const std::size_t i : bank.suspects()) {
-        if (!bank[i].acting || !bank.still_suspicious(i, step.h())) continue;
-        examine(step, bank, i, calls);
+    for (const std::size_t i : guards.suspects()) {
+        if (!guards[i].acting || !guards.still_suspicious(i, step.h())) continue;
+        examine(step, guards, i, calls);
     }
     if (hits_.empty()) return false;
-    close_set(step, bank, calls);
+    close_set(step, guards, calls);
     if (fired_.size() == 1) {
         at_ = first_->where.root;
         at_remainder_ = first_->where.root_remainder;
@@ -27,7 +27,7 @@ inline bool EventSearch<X, single>::find_among(const CurrentStep& step, Bank& ba
 }
 
 template <class X, bool single>
-inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& bank,
+inline void EventSearch<X, single>::close_set(const CurrentStep& step, Guards& guards,
                                               std::uint64_t& calls)
 {
     first_ = nullptr;
@@ -37,15 +37,15 @@ inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& ban
         first = std::min(first, hit.guess);
     }
     for (Hit& hit : hits_) {
-        if (hit.guess == first) locate(step, bank, hit, calls);
+        if (hit.guess == first) locate(step, guards, hit, calls);
     }
     double limit = window_end(step);
     for (bool changed = true; changed;) {
         changed = false;
-        find_departed(step, bank, std::min(limit, step.h()), calls);
+        find_departed(step, guards, std::min(limit, step.h()), calls);
         for (Hit& hit : hits_) {
             if (!hit.departed || hit.located) continue;
-            locate(step, bank, hit, calls);
+            locate(step, guards, hit, calls);
             changed = true;
         }
         limit = window_end(step);
@@ -56,8 +56,8 @@ inline void EventSearch<X, single>::close_set(const CurrentStep& step, Bank& ban
 }
 
 template <class X, bool single>
-inline void EventSearch<X, single>::find_departed(const CurrentStep& step, Bank& bank, double at,
-                                                  std::uint64_t& calls)
+inline void EventSearch<X, single>::find_departed(const CurrentStep& step, Guards& guards,
+                                                  double at, std::uint64_t& calls)
 {
     bool placed = false;
     for (Hit& hit : hits_) {
@@ -66,7 +66,7 @@ inline void EventSearch<X, single>::find_departed(const CurrentStep& step, Bank&
         if (hit.departed) continue;
         if (!placed) place(step, at, space_.x);
         placed = true;
-        const auto guard = bank.view(hit.guard, step.mode(), calls);
+        const auto guard = guards.view(hit.guard, step.mode(), calls);
         hit.value = guard.value(step.time(at), space_.x);
         hit.departed = has_left(hit.side, hit.value);
     }
@@ -131,7 +131,7 @@ void EventSearch<X, single>::join_at_end(const CurrentStep& step, std::size_t i,
 }
 
 template <class X, bool single>
-inline double EventSearch<X, single>::lacks(const CurrentStep& step, Bank& bank, const X& x,
+inline double EventSearch<X, single>::lacks(const CurrentStep& step, Guards& guards, const X& x,
                                             const TwoSum& at, std::uint64_t& calls)
 {
     const double t = step.instant(at.value, at.remainder).value;
@@ -140,7 +140,7 @@ inline double EventSearch<X, single>::lacks(const CurrentStep& step, Bank& bank,
         for (Hit& hit : hits_) {
             if (hit.guard != i || hit.where.jump) continue;
             const bool known = &x == &before_ && is_at_change(step, hit, at, t);
-            hit.value = known ? change_.at.value : bank.view(i, step.mode(), calls).value(t, x);
+            hit.value = known ? change_.at.value : guards.view(i, step.mode(), calls).value(t, x);
             if (has_left(hit.side, hit.value)) continue;
             // A guard of the set that the window has put together with later ones may have turned
             // back.
@@ -153,12 +153,12 @@ inline double EventSearch<X, single>::lacks(const CurrentStep& step, Bank& bank,
 }
 
 template <class X, bool single>
-inline bool EventSearch<X, single>::holds_ahead(const CurrentStep& step, Bank& bank, double ahead,
-                                                std::uint64_t& calls)
+inline bool EventSearch<X, single>::holds_ahead(const CurrentStep& step, Guards& guards,
+                                                double ahead, std::uint64_t& calls)
 {
     const X& x = space_.root;
     const TwoSum at = two_sum(at_, at_remainder_ + ahead);
-    values_known_ = all_finite(x) && lacks(step, bank, x, at, calls) == 0;
+    values_known_ = all_finite(x) && lacks(step, guards, x, at, calls) == 0;
     if (!values_known_) return false;
     at_ = at.value;
     at_remainder_ = at.remainder;
@@ -173,11 +173,11 @@ inline bool EventSearch<X, single>::holds_ahead(const CurrentStep& step, Bank& b
 }
 
 template <class X, bool single>
-inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Bank& bank,
+inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Guards& guards,
                                                     std::uint64_t& calls)
 {
     if (late_) return true;
-    double wait = lacks(step, bank, before_, {at_, at_remainder_}, calls);
+    double wait = lacks(step, guards, before_, {at_, at_remainder_}, calls);
     values_known_ = wait == 0;
     if (values_known_) return true;
     double far = at_;
@@ -189,7 +189,7 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
     const bool straight = straight_in_space_;
     keep_rate(step);
     X& x = space_.root;
-    const auto holds = [&](double ahead) { return holds_ahead(step, bank, ahead, calls); };
+    const auto holds = [&](double ahead) { return holds_ahead(step, guards, ahead, calls); };
     for (int k = 0; k <= 8 && wait > 0 && wait < room; ++k, wait *= 2) {
         move(x, before_, wait, rate_);
         if (holds(wait)) return true;
@@ -224,17 +224,17 @@ inline bool EventSearch<X, single>::meet_conditions(const CurrentStep& step, Ban
 }
 
 template <class X, bool single>
-bool EventSearch<X, single>::meet_conditions_on_time(const CurrentStep& step, Bank& bank,
+bool EventSearch<X, single>::meet_conditions_on_time(const CurrentStep& step, Guards& guards,
                                                      std::uint64_t& calls)
 {
     const TwoSum at{at_, 0};
-    double wait = lacks(step, bank, before_, at, calls);
+    double wait = lacks(step, guards, before_, at, calls);
     if (wait == 0) return true;
     keep_rate(step);
     X& x = space_.root;
     for (int k = 0; k <= 8 && std::isfinite(wait); ++k, wait *= 2) {
         move(x, before_, wait, rate_);
-        if (!all_finite(x) || lacks(step, bank, x, at, calls) != 0) continue;
+        if (!all_finite(x) || lacks(step, guards, x, at, calls) != 0) continue;
         assign(before_, x);
         return true;
     }
@@ -242,8 +242,8 @@ bool EventSearch<X, single>::meet_conditions_on_time(const CurrentStep& step, Ba
 }
 
 template <class X, bool single>
-double EventSearch<X, single>::go_beyond(const CurrentStep& step, Bank& bank, std::size_t i, X& x,
-                                         std::uint64_t& calls)
+double EventSearch<X, single>::go_beyond(const CurrentStep& step, Guards& guards, std::size_t i,
+                                         X& x, std::uint64_t& calls)
 {
     const double t0 = step.time(at_);
     const double ulps = tolerances::of_time * std::fabs(t0);
@@ -255,7 +255,7 @@ double EventSearch<X, single>::go_beyond(const CurrentStep& step, Bank& bank, st
     for (double ahead = most / 256; ahead <= most; ahead *= 2) {
         move(x, before_, ahead, rate_);
         const double t = step.instant(at_, at_remainder_ + ahead).value;
-        const double g = bank.view(i, step.mode(), calls).value(t, x);
+        const double g = guards.view(i, step.mode(), calls).value(t, x);
         if (sign * g < 0) return t;
     }
     return std::numeric_limits<double>::quiet_NaN();

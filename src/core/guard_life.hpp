@@ -59,7 +59,7 @@ struct Row {
 {
     return 1u << static_cast<unsigned>(cause);
 }
-inline constexpr unsigned anew = by(Cause::fired) | by(Cause::enabled);
+inline constexpr unsigned again = by(Cause::fired) | by(Cause::enabled);
 inline constexpr unsigned whenever = (1u << causes) - 1;
 
 inline constexpr std::array rows{
@@ -68,9 +68,9 @@ inline constexpr std::array rows{
     Row{whenever, asks, 0, Arming::by_condition,
         "beyond its surface it fires where at_start or at_entry asks for it"},
     // guards that bound the motion
-    Row{by(Cause::start) | anew, is_unilateral | is_below, on_surface, Arming::outside,
+    Row{by(Cause::start) | again, is_unilateral | is_below, on_surface, Arming::outside,
         "no start, no reset and no mode leaves the motion behind a surface that bounds it"},
-    Row{by(Cause::start) | anew | by(Cause::opened), is_unilateral | is_below | on_surface, 0,
+    Row{by(Cause::start) | again | by(Cause::opened), is_unilateral | is_below | on_surface, 0,
         Arming::fires, "a motion that presses on a surface that bounds it fires again"},
     // the others fire where they are crossed
     Row{by(Cause::stood), crosses, 0, Arming::fires,

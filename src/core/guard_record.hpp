@@ -68,11 +68,11 @@ private:
 /// What is found of a guard at a set before its resets are called, for use after them: no function
 /// is called any more in a mode that has been left.
 struct NotedAtSet {
-    double band = 0;      ///< event tolerance
-    double value = 0;     ///< |g| where it fired, if the tolerance is estimated
-    double slope = 0;     ///< [1/s] of an excursion that ends here, and
-    double rounding = 0;  ///< the change of the guard by rounding, where they have to be known
-    bool vetoed = false;  ///< `enabled` rejects an event here
+    double tolerance = 0;  ///< event tolerance
+    double value = 0;      ///< |g| where it fired, if the tolerance is estimated
+    double slope = 0;      ///< [1/s] of an excursion that ends here, and
+    double rounding = 0;   ///< the change of the guard by rounding, where they have to be known
+    bool vetoed = false;   ///< `enabled` rejects an event here
 };
 
 /// State of a guard besides its values.
@@ -88,13 +88,13 @@ struct GuardRecord {
     bool again = false;            ///< it has returned inside the window of its last event
     Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
     bool acting = false;    ///< has a reset or may end the run; else events are only recorded
-    bool deferred = false;  ///< its check is deferred: the bank holds nothing of this step
+    bool deferred = false;  ///< its check is deferred: nothing of this step is known of it
     Side side = Side::plateau;
     Side next = Side::plateau;  ///< at the end of the step, if it stands
     bool dips = false;          ///< its bounds show an event in the current step
     bool jumped = false;        ///< its last event was a jump
     bool departs = false;       ///< the current smooth phase started at its event, or enabled it
-    double band =
+    double tolerance =
         0;  ///< event tolerance: |g| where it fired, up to which it counts as being on its surface
     bool estimated = false;  ///< the tolerance is the error of location, not a value of the guard
     NotedAtSet noted;
@@ -106,8 +106,8 @@ struct GuardRecord {
     bool returned = false;  ///< it has come back to that side from the other one
     ShrinkingIntervals intervals;
     Excursions excursions;
-    std::uint64_t instant = 0;  ///< the last at which it fired at the start of a step
-    std::uint32_t at_once = 0;  ///< how often it did so then
+    std::uint64_t instant = 0;           ///< the last at which it fired at the start of a step
+    std::uint32_t times_at_instant = 0;  ///< how often it did so then
     /// The arming of all guards by which its last event has been recorded.
     std::uint64_t recorded_in = std::numeric_limits<std::uint64_t>::max();
     bool armed_beyond = false;  ///< where it was armed at the start, or by a mode
@@ -128,7 +128,7 @@ template <class X>
 }
 
 /// Requirements of a detector on all guards, of a system with bounds or without.
-struct BankRules {
+struct GuardRules {
     Screening screening = Screening::ends;
     bool uses_rates = false;
     bool defers = false;
@@ -149,7 +149,7 @@ struct BankRules {
     [[nodiscard]] bool keeps_sizes() const noexcept { return remembers || bounded; }
 
     template <class X>
-    [[nodiscard]] static BankRules of(const DetectorTable<X>& detector, const SystemAt<X>& system)
+    [[nodiscard]] static GuardRules of(const DetectorTable<X>& detector, const SystemAt<X>& system)
     {
         const bool bounded = system->bounded;
         return {.screening = detector.screening,

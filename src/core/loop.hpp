@@ -209,14 +209,13 @@ protected:
     /// Keeps the start of every step from here on, so that the run can continue after exceptions.
     void keep_resumable()
     {
-        mark_ = std::make_unique<Mark>(bank_);
+        mark_ = std::make_unique<Mark>(guards_);
         step_.store(mark_->start);
     }
 
 private:
     using Engine::asked_;
     using Engine::backward_;
-    using Engine::bank_;
     using Engine::calls;
     using Engine::change_due_;
     using Engine::defers_;
@@ -227,6 +226,7 @@ private:
     using Engine::error_controlled_;
     using Engine::finders_;
     using Engine::guarded_;
+    using Engine::guards_;
     using Engine::h_next_;
     using Engine::holds_;
     using Engine::infinity;
@@ -315,7 +315,7 @@ private:
     // --- resumption after an exception ---
 
     struct Mark {
-        explicit Mark(const GuardBank<X, single>& bank_) : bank(bank_) {}
+        explicit Mark(const GuardTable<X, single>& guards_) : guards(guards_) {}
 
         double h_next = 0;
         Statistics counts{};
@@ -327,7 +327,7 @@ private:
         bool newly_armed = false;
         bool everything = false;  ///< the members below are kept, too
         StepStart<X> start{};
-        GuardBank<X, single> bank;
+        GuardTable<X, single> guards;
         double flight_start = 0, longest_step = 0, last_h = 0, time_event = 0;
         bool resting = false, watching = false;
         typename Engine::Holds holds{};
@@ -337,7 +337,7 @@ private:
     void plan_anew()
     {
         if (!replans_) return;
-        bank_.wake_all(step_, last_h_, calls(), newly_armed_);
+        guards_.wake_all(step_, last_h_, calls(), newly_armed_);
         newly_armed_ = true;
         replans_ = false;
     }
@@ -370,7 +370,7 @@ private:
     {
         return quiet_ && holds_.empty() && step_.start().value != options_.t_end &&
                run_.statistics.steps < next_review_ && !options_.record_steps &&
-               next_sample_ >= options_.sample_times.size() && bank_.is_steady();
+               next_sample_ >= options_.sample_times.size() && guards_.is_steady();
     }
 
     /// Takes steps until one needs a check, and handles it. False: no step did. After an exception

@@ -16,7 +16,7 @@ template <class X, bool single>
 bool Loop<X, single>::search(bool cleared)
 {
     mark_everything();
-    if (bank_.first_not_finite() != no_guard) {
+    if (guards_.first_not_finite() != no_guard) {
         if (!return_to_domain()) return true;
         if (!this->any_suspicious()) {
             this->pass_on_clear();
@@ -70,7 +70,7 @@ inline bool Loop<X, single>::return_to_domain()
 {
     bool beyond = true;
     for (;;) {
-        const std::size_t broken = bank_.first_not_finite();
+        const std::size_t broken = guards_.first_not_finite();
         if (broken == no_guard) return true;
         const double h = shorten_into_domain(std::exchange(beyond, false));
         if (is_tentative() || h < smallest_step()) {
@@ -107,7 +107,7 @@ bool Loop<X, single>::smooth_step()
         if (!take_controlled_step(h, h)) return false;
         note_change();
         this->sample_end();
-        if (bank_.first_not_finite() != no_guard) return return_to_domain();
+        if (guards_.first_not_finite() != no_guard) return return_to_domain();
         if (!this->any_suspicious()) return true;
     }
     return true;

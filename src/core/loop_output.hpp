@@ -32,7 +32,7 @@ template <class X, bool single>
 bool Loop<X, single>::starts_at_set() const noexcept
 {
     const double t = step_.start().value;
-    return (guarded_ && bank_.armed_at() == t) || (timed_ && this->passed_ == t);
+    return (guarded_ && guards_.armed_at() == t) || (timed_ && this->passed_ == t);
 }
 
 template <class X, bool single>

@@ -45,7 +45,7 @@ inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& ho
         this->ends_on_time() ? tolerances::by_rounding * step_.h() : 0;  // for ties
     const double ends = (backward_ ? -t : t) + margin;
     if (planner_->covers(ends)) {
-        planner_->sample_sleeper(step_, bank_, run_.statistics);
+        planner_->sample_sleeper(step_, guards_, run_.statistics);
         if (planner_->wrong()) return this->name_wrong_bound();
         this->count_deferred(1);
         return pass();
@@ -87,7 +87,7 @@ template <class X, bool single>
 inline void Loop<X, single>::close_interval()
 {
     const std::size_t steps = planner_->steps().size();
-    const std::size_t doubt = planner_->close(step_, bank_, run_.statistics, h_next_);
+    const std::size_t doubt = planner_->close(step_, guards_, run_.statistics, h_next_);
     if (planner_->wrong()) {
         if (doubt != Planner<X, single>::none && doubt + 1 < steps) take_back_to(doubt, steps - 1);
         return this->name_wrong_bound();
@@ -108,7 +108,7 @@ inline void Loop<X, single>::judge()
 {
     if (this->judges_suspicious() && search(false)) return;
     if (watching_) return pass();
-    planner_->settle(step_, bank_, run_.statistics);
+    planner_->settle(step_, guards_, run_.statistics);
     if (planner_->wrong()) return this->name_wrong_bound();
     pass();
 }

@@ -21,12 +21,12 @@ inline QuietRun Loop<X, single>::quiet_orders() const
         .atol = options_.atol,
         .h_min = options_.h_min,
         .h_max = options_.h_max,
-        .checks_inside = bank_.checks_inside() && options_.check_inside && !this->on_series_,
+        .checks_inside = guards_.checks_inside() && options_.check_inside && !this->on_series_,
         .most_steps = next_review_ - run_.statistics.steps,
         .cancelled = options_.cancelled,
         .system = system_.operator->(),
         .h_next = h_next_};
-    bank_.lend(quiet, step_.time(0));
+    guards_.lend(quiet, step_.time(0));
     return quiet;
 }
 
@@ -66,9 +66,9 @@ template <class X, bool single>
 inline void Loop<X, single>::take_over(const QuietRun& quiet)
 {
     if (this->on_series_) {
-        bank_.take_back_on_series(quiet, step_);
+        guards_.take_back_on_series(quiet, step_);
     } else {
-        bank_.take_back(quiet, step_, calls());
+        guards_.take_back(quiet, step_, calls());
     }
     h_next_ = error_controlled_ || quiet.why == QuietEnd::due ? quiet.h_next : h_next_;
     Statistics& counts = run_.statistics;
@@ -77,7 +77,7 @@ inline void Loop<X, single>::take_over(const QuietRun& quiet)
     if (quiet.steps == 0) return;
     last_h_ = step_.h();
     counts.steps += quiet.steps;
-    if (bank_.size() > 0) this->add_evidence(this->evidence_of_quiet(), quiet.steps);
+    if (guards_.size() > 0) this->add_evidence(this->evidence_of_quiet(), quiet.steps);
 }
 
 template <class X, bool single>
@@ -90,7 +90,7 @@ inline void Loop<X, single>::end_quiet_run(const QuietRun& quiet)
                                ? retry(h, h, quiet.repeated ? 1 : rule_.largest, quiet.error)
                                : take_fixed_step(h, true);
         if (!taken || (guarded_ && handle_events())) return;
-    } else if (this->on_series_ && !bank_.on_series()) {
+    } else if (this->on_series_ && !guards_.on_series()) {
         if (handle_events()) return;
     } else if (this->on_series_ || this->is_suspicious(quiet.why == QuietEnd::moving)) {
         if (search(false)) return;

@@ -85,7 +85,7 @@ void Loop<X, single>::start_at(double t, const X& x, Mode mode)
     due_here_ = this->timer_idles_ = false;
     this->listed_at_ = Engine::stale;
     if (timed_) this->find_time_event(Engine::After::restart);
-    bank_.forget();
+    guards_.forget();
     if (guarded_) {
         search_.begin(step_.x0());
         this->arm_at_start(false);
@@ -103,7 +103,7 @@ void Loop<X, single>::drop_from(double t)
         --run_.statistics.events;
         const bool fired = event.kind != EventKind::accumulation && event.kind != EventKind::mode;
         if (event.guard != no_guard && fired) {
-            --bank_[event.guard].events;
+            --guards_[event.guard].events;
         }
         events.pop_back();
     }

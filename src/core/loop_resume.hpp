@@ -78,7 +78,7 @@ void Loop<X, single>::copy_to_mark()
     } else {
         step_.store(mark_->start);
     }
-    mark_->bank = bank_;
+    mark_->guards = guards_;
     mark_->flight_start = flight_start_;
     mark_->longest_step = longest_step_;
     mark_->last_h = last_h_;
@@ -109,7 +109,7 @@ template <class X, bool single>
 void Loop<X, single>::put_back_everything(const Mark& mark)
 {
     step_.restart(mark.start);
-    bank_ = mark.bank;
+    guards_ = mark.guards;
     flight_start_ = mark.flight_start;
     longest_step_ = mark.longest_step;
     last_h_ = mark.last_h;

@@ -49,7 +49,7 @@ inline void Loop<X, single>::go_on_from_place()
     watching_ = replans_ = due_here_ = change_due_ = on_change_ = false;
     this->listed_at_ = Engine::stale;
     if (guarded_) search_.begin(step_.x0());
-    if (defers_) planner_->restore(bank_);
+    if (defers_) planner_->restore(guards_);
 }
 
 template <class X, bool single>

@@ -34,7 +34,7 @@ inline std::vector<RunProperty> Loop<X, single>::properties() const
                               .detector = plain_type_name(finders_.detector.type),
                               .locator = plain_type_name(finders_.locator.type),
                               .components = components_,
-                              .guards = bank_.size(),
+                              .guards = guards_.size(),
                               .error_controlled = error_controlled_},
                              options_);
 }
@@ -72,7 +72,7 @@ inline void Loop<X, single>::refuse_bad_place() const
     const std::size_t modes = this->modes();
     require(modes == 0 || place_.mode < modes, "the mode");
     require(this->holds_fit(components), "what a rest holds");
-    const auto is_guard = [this](std::size_t i) { return i == no_guard || i < bank_.size(); };
+    const auto is_guard = [this](std::size_t i) { return i == no_guard || i < guards_.size(); };
     require(is_guard(run_.guard) &&
                 (is_guard(run_.other_guard) || run_.other_guard == time_event_reset) &&
                 (!run_.wrong_bound || is_guard(run_.wrong_bound->guard)),

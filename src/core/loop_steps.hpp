@@ -146,7 +146,7 @@ template <class X, bool single>
 inline void Loop<X, single>::reach_end()
 {
     if (defers_ && !newly_armed_ && !resting_) {
-        planner_->check_last(step_, bank_, run_.statistics);
+        planner_->check_last(step_, guards_, run_.statistics);
         if (planner_->wrong()) return this->name_wrong_bound();
     }
     // A run without an end that reaches the largest double has not reached an end.
@@ -271,11 +271,11 @@ inline auto Loop<X, single>::time_to_surface() -> Approach
     Approach first;
     if (is_tentative()) return first;
     if (defers_) this->watch_all();
-    for (std::size_t i = 0; i < bank_.size(); ++i) {
-        const GuardRecord& record = bank_[i];
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        const GuardRecord& record = guards_[i];
         if (!record.enabled || record.info.boolean) continue;
         if (!counts(record.side, record.info.crossing)) continue;
-        const double g = bank_.g0(i);
+        const double g = guards_.g0(i);
         const double rate = approach_rate(i);
         const double ahead = g * rate < 0 && std::isfinite(rate) ? -g / rate : infinity;
         if (ahead < first.ahead) first = {i, ahead};
@@ -286,7 +286,7 @@ inline auto Loop<X, single>::time_to_surface() -> Approach
 template <class X, bool single>
 inline double Loop<X, single>::approach_rate(std::size_t i)
 {
-    double rate = bank_.complete_rate0(i, step_, h_next_, calls());
+    double rate = guards_.complete_rate0(i, step_, h_next_, calls());
     if (!system_->rated) {
         // Over a short step the rounding of the state may swallow the difference.
         double scale = h_next_;
@@ -304,12 +304,12 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
     const std::size_t i = approach.guard;
     if (!(approach.ahead <= 16 * std::max(h, smallest_step())) || !this->counts_here(i))
         return false;
-    if (!bank_[i].acting) {
-        this->record_jump(i, bank_[i].side);
+    if (!guards_[i].acting) {
+        this->record_jump(i, guards_[i].side);
         return false;
     }
     this->begin_set();
-    bank_[i].band = std::fabs(bank_.g0(i));
+    guards_[i].tolerance = std::fabs(guards_.g0(i));
     search_.fired().clear();
     search_.fired().push_back(i);
     settle_and_record();

@@ -23,7 +23,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/guard_bank.hpp"
+#include "core/guard_table.hpp"
 #include "core/tolerances.hpp"
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/system_table.hpp"
@@ -46,15 +46,15 @@ public:
     explicit MergedResets(const X& like) : after_(like), single_(like), along_(like) {}
 
     /// Applies the resets of the guards that fired to the state `before`, and the reset of a time
-    /// event, and then lets the system decide its mode, if it does. `bank` knows which guards have
-    /// a reset.
+    /// event, and then lets the system decide its mode, if it does. `guards` knows which guards
+    /// have a reset.
     /// @param stands  whether guard i still has its event in a mode and a state, and in which
     ///                direction it has crossed
-    template <class Bank, class Stands>
-    void apply(const SystemAt<X>& system, const Bank& bank, const FiredSet& set, const X& before,
-               const Stands& stands)
+    template <class Guards, class Stands>
+    void apply(const SystemAt<X>& system, const Guards& guards, const FiredSet& set,
+               const X& before, const Stands& stands)
     {
-        apply_resets(system, bank, set, before, stands);
+        apply_resets(system, guards, set, before, stands);
         if (!system->after_set || conflict_.first != no_guard) return;
         mode_ = system->after_set(system.adapter(), FiredGuards(set.fired, set.on_time), set.mode,
                                   set.t, before, after_);
@@ -103,8 +103,8 @@ public:
     [[nodiscard]] const std::string& reason() const noexcept { return reason_; }
 
 private:
-    template <class Bank, class Stands>
-    void apply_resets(const SystemAt<X>& system, const Bank& bank, const FiredSet& set,
+    template <class Guards, class Stands>
+    void apply_resets(const SystemAt<X>& system, const Guards& guards, const FiredSet& set,
                       const X& before, const Stands& stands)
     {
         const std::span<const std::size_t> fired = set.fired;
@@ -117,13 +117,15 @@ private:
         stops_ = false;
         if (fired.size() == 1 && !on_time && !system->reset_set) {
             const std::size_t i = fired[0];
-            if (!system->reset || !bank[i].info.resets) return;
+            if (!system->reset || !guards[i].info.resets) return;
             tell_direction(system, stands.direction(i));
             mode_ =
                 ask(i, mode, [&] { return system->reset(system.adapter(), i, mode, t, after_); });
             return;
         }
-        const auto resets = [&](std::size_t i) { return system->resets() && bank[i].info.resets; };
+        const auto resets = [&](std::size_t i) {
+            return system->resets() && guards[i].info.resets;
+        };
         if (system->reset_set && std::any_of(fired.begin(), fired.end(), resets)) {
             const FiredGuards set(fired, on_time);
             mode_ = ask(fired[0], mode,

@@ -63,7 +63,7 @@ public:
             setup.detector.check(setup.detecting, setup.adapter, like, 0, Engine::infinity);
         }
         cut_.before = cut_.after = like;
-        cut_.fired.reserve(std::max<std::size_t>(bank_.size(), 1));
+        cut_.fired.reserve(std::max<std::size_t>(guards_.size(), 1));
     }
 
     Verdict start(const Instant& t, const X& x, const double* dxdt, Mode mode,
@@ -88,7 +88,7 @@ public:
         this->due_here_ = this->timer_idles_ = false;
         this->listed_at_ = Engine::stale;
         if (timed_) this->find_time_event(Engine::After::start);
-        bank_.forget();
+        guards_.forget();
         if (guarded_) this->arm_at_start(!options_.continues);
         started_ = true;
         return or_start_anew([&] { return go_on(); });
@@ -176,8 +176,8 @@ public:
 
     [[nodiscard]] Side side(std::size_t guard) const override
     {
-        if (guard >= bank_.size()) throw_no_such_guard(guard, bank_.size());
-        return bank_[guard].side;
+        if (guard >= guards_.size()) throw_no_such_guard(guard, guards_.size());
+        return guards_[guard].side;
     }
     [[nodiscard]] const Run<X>& run() noexcept override
     {
@@ -220,16 +220,16 @@ public:
         this->pending_ = Pending::nothing;
         started_ = true;
         if (guarded_) search_.begin(step_.x0());
-        if (defers_) planner_->restore(bank_);
+        if (defers_) planner_->restore(guards_);
     }
 
 private:
     using Engine::backward_;
-    using Engine::bank_;
     using Engine::defers_;
     using Engine::ended_;
     using Engine::finders_;
     using Engine::guarded_;
+    using Engine::guards_;
     using Engine::h_next_;
     using Engine::newly_armed_;
     using Engine::options_;
@@ -407,8 +407,8 @@ private:
 
     [[nodiscard]] bool finds(bool cleared)
     {
-        std::size_t broken = bank_.first_not_finite();
-        if (broken == no_guard) broken = bank_.first_without_rate();  // the host no longer has it
+        std::size_t broken = guards_.first_not_finite();
+        if (broken == no_guard) broken = guards_.first_without_rate();  // the host no longer has it
         if (broken == no_guard) return this->find(cleared);
         this->end_not_finite("", broken);
         return false;
@@ -421,18 +421,18 @@ private:
         const double end = clock(step_.time(step_.h()));
         bool found = false;
         if (planner_->covers(end)) {
-            planner_->sample_sleeper(step_, bank_, run_.statistics);
+            planner_->sample_sleeper(step_, guards_, run_.statistics);
             this->count_deferred(1);
         } else {
             step_.store(planner_->steps().add().start);
             planner_->overrun(end);
-            const std::size_t doubt = planner_->close(step_, bank_, run_.statistics, h_next_);
+            const std::size_t doubt = planner_->close(step_, guards_, run_.statistics, h_next_);
             planner_->steps().clear();
             if (doubt == Planner<X, single>::none) {
                 this->count_deferred(1);
             } else if (!planner_->wrong()) {
                 found = this->judges_suspicious() && finds(false);
-                if (!found && !ended_) planner_->settle(step_, bank_, run_.statistics);
+                if (!found && !ended_) planner_->settle(step_, guards_, run_.statistics);
             }
         }
         if (planner_->wrong()) this->name_wrong_bound();
@@ -524,7 +524,7 @@ private:
         return {{"monitor of", system_->name(system_.adapter())},
                 {"detector", plain_type_name(finders_.detector.type)},
                 {"locator", plain_type_name(finders_.locator.type)},
-                {"guards", std::to_string(bank_.size())},
+                {"guards", std::to_string(guards_.size())},
                 {"components", std::to_string(components_)},
                 {"direction", backward_ ? "backward" : "forward"}};
     }

@@ -20,7 +20,7 @@
 
 #include "core/enclosed_intervals.hpp"
 #include "core/event_search.hpp"
-#include "core/guard_bank.hpp"
+#include "core/guard_table.hpp"
 #include "core/metering.hpp"
 #include "core/tentative_steps.hpp"
 #include "core/tolerances.hpp"
@@ -66,7 +66,7 @@ struct LastCheck {
 template <class X, bool single>
 class Planner {
     static constexpr double infinity = std::numeric_limits<double>::infinity();
-    using Bank = GuardBank<X, single>;
+    using Guards = GuardTable<X, single>;
     using Steps = TentativeSteps<X>;
 
 public:
@@ -109,32 +109,32 @@ public:
     void review(const Statistics& counts) { meter_.review(counts); }
 
     /// Plans after every guard has been armed at the start of the step, and sampled there.
-    void begin(const Step<X>& step, Bank& bank)
+    void begin(const Step<X>& step, Guards& guards)
     {
         steps_.clear();
         deadlines_.clear();
         pending_.clear();
         judged_.clear();
         const double now = clock(step.time(0));
-        for (std::size_t i = 0; i < bank.size(); ++i) {
-            if (!bank[i].enabled) continue;
+        for (std::size_t i = 0; i < guards.size(); ++i) {
+            if (!guards[i].enabled) continue;
             const double interval = checks_[i].interval;
             checks_[i] = {};
             checks_[i].interval = interval;
             checks_[i].time = now;
-            checks_[i].slope = sign_of(bank[i].side) * bank.rate0(i);
+            checks_[i].slope = sign_of(guards[i].side) * guards.rate0(i);
             rest_from(i,
                       {.time = now,
-                       .value = bank.g0(i),
+                       .value = guards.g0(i),
                        .t = step.time(0),
                        .x = &step.x0(),
                        .exact = true},
-                      step.mode(), bank);
-            checks_[i].rate = bank.rate0(i);
+                      step.mode(), guards);
+            checks_[i].rate = guards.rate0(i);
             // No range on an interval that starts at the surface excludes it.
-            if (encloses() && bank.starts_at_event(i, step)) checks_[i].verify = true;
+            if (encloses() && guards.starts_at_event(i, step)) checks_[i].verify = true;
             schedule(i);
-            bank.put_to_sleep(i);
+            guards.put_to_sleep(i);
         }
         find_limit();
     }
@@ -158,7 +158,7 @@ public:
     /// Checks every pending guard at the end of the current step and, if doubts remain, at earlier
     /// starts. Returns the first step that could not be closed, or `none`; if it is the current
     /// step, `judged` has the guards that the exact detector examines in it.
-    [[nodiscard]] std::size_t close(const Step<X>& step, Bank& bank, Statistics& counts,
+    [[nodiscard]] std::size_t close(const Step<X>& step, Guards& guards, Statistics& counts,
                                     double h_next)
     {
         meter_.review(counts);
@@ -166,8 +166,8 @@ public:
         std::size_t doubt = none;
         for (const std::size_t i : pending_) {
             const bool in_doubt = std::exchange(checks_[i].verify, false);
-            const std::size_t failed = encloses() ? enclose_one(i, in_doubt, step, bank, counts)
-                                                  : close_one(i, step, bank, counts, h_next);
+            const std::size_t failed = encloses() ? enclose_one(i, in_doubt, step, guards, counts)
+                                                  : close_one(i, step, guards, counts, h_next);
             checks_[i].first = failed;
             doubt = std::min(doubt, failed);
         }
@@ -195,33 +195,33 @@ public:
     }
 
     /// Defers those of the guards to be verified that their bounds clear on a division of the
-    /// current step. Tells the bank which of the others have an event inside.
-    void close_inside(const Step<X>& step, Bank& bank, EventSearch<X, single>& search,
+    /// current step. Tells the table which of the others have an event inside.
+    void close_inside(const Step<X>& step, Guards& guards, EventSearch<X, single>& search,
                       Statistics& counts);
 
     /// Guards that the exact detector verifies in the current step.
     [[nodiscard]] std::span<const std::size_t> judged() const noexcept { return judged_.span(); }
 
-    /// Hands the guards to be verified to the bank, with their samples at both ends of the step.
+    /// Wakes the guards to be verified, with their samples at both ends of the step.
     /// `last_h`: the step before it [s].
-    void wake(const Step<X>& step, Bank& bank, Statistics& counts, double last_h)
+    void wake(const Step<X>& step, Guards& guards, Statistics& counts, double last_h)
     {
         for (const std::size_t i : judged()) {
             LastCheck& check = checks_[i];
             const double h = step.h();
             const Check start = check_of(step.time(0), step.x0());
             const Check end = check_of(step.time(h), step.x1());
-            const double value = value_at(i, start, step.mode(), bank, counts);
+            const double value = value_at(i, start, step.mode(), guards, counts);
             if (!(check.rate == check.rate) || check.time != start.time) {
                 check.rate = meter_.time_guard([&] {
-                    return bank.rate_of(i, Bank::arrival_of(step, last_h), counts.guard_calls);
+                    return guards.rate_of(i, Guards::arrival_of(step, last_h), counts.guard_calls);
                 });
             }
-            const double end_value = value_at(i, end, step.mode(), bank, counts);
+            const double end_value = value_at(i, end, step.mode(), guards, counts);
             const double rate = meter_.time_guard(
-                [&] { return bank.rate_of(i, Bank::end_of(step), counts.guard_calls); });
-            bank.wake(i, {.s = 0, .value = value, .rate = check.rate},
-                      {.s = h, .value = end_value, .rate = rate});
+                [&] { return guards.rate_of(i, Guards::end_of(step), counts.guard_calls); });
+            guards.wake(i, {.s = 0, .value = value, .rate = check.rate},
+                        {.s = h, .value = end_value, .rate = rate});
             remember(check, end.time, end_value);
             check.rate = rate;
         }
@@ -229,7 +229,7 @@ public:
 
     /// Defers the verified guards from the end of a step in which the exact detector has found
     /// nothing that cuts it short.
-    void settle(const Step<X>& step, Bank& bank, Statistics& counts)
+    void settle(const Step<X>& step, Guards& guards, Statistics& counts)
     {
         const double t = step.time(step.h());
         for (const std::size_t i : judged()) {
@@ -239,10 +239,10 @@ public:
             const bool same_end = check.later_time == end.time;
             const double rate = same_end ? check.rate : std::numeric_limits<double>::quiet_NaN();
             check.verify = false;
-            end.value = value_at(i, end, step.mode(), bank, counts);
-            defer_from(i, end, step.mode(), bank);
+            end.value = value_at(i, end, step.mode(), guards, counts);
+            defer_from(i, end, step.mode(), guards);
             check.rate = rate;
-            bank.put_to_sleep(i);
+            guards.put_to_sleep(i);
         }
         judged_.clear();
         find_limit();
@@ -250,21 +250,21 @@ public:
 
     /// Tests one of the deferred guards, in rotation, at the end of every 64th unchecked step, if
     /// bounds are checked.
-    void sample_sleeper(const Step<X>& step, Bank& bank, Statistics& counts)
+    void sample_sleeper(const Step<X>& step, Guards& guards, Statistics& counts)
     {
         if (!bounded_ || !detector_->checks_bounds) return;
-        if (++covered_ % 64 != 0 || bank.size() == 0) return;
-        const std::size_t i = covered_ / 64 % bank.size();
-        watch_sleeper(i, place(steps_.size(), step), step.mode(), bank, counts);
+        if (++covered_ % 64 != 0 || guards.size() == 0) return;
+        const std::size_t i = covered_ / 64 % guards.size();
+        watch_sleeper(i, place(steps_.size(), step), step.mode(), guards, counts);
     }
 
     /// Checks the guards that are still deferred when the run ends, at the start of the step: a
     /// guard beyond its surface was covered by a bound that was wrong.
-    void check_last(const Step<X>& step, Bank& bank, Statistics& counts)
+    void check_last(const Step<X>& step, Guards& guards, Statistics& counts)
     {
         if (!bounded_) return;
-        for (std::size_t i = 0; i < bank.size(); ++i) {
-            watch_sleeper(i, check_of(step.time(0), step.x0()), step.mode(), bank, counts);
+        for (std::size_t i = 0; i < guards.size(); ++i) {
+            watch_sleeper(i, check_of(step.time(0), step.x0()), step.mode(), guards, counts);
         }
     }
 
@@ -293,15 +293,15 @@ public:
     }
 
     /// Rebuilds the queue after `visit` has restored the checks.
-    void restore(const Bank& bank)
+    void restore(const Guards& guards)
     {
         deadlines_.clear();
         pending_.clear();
         judged_.clear();
         steps_.clear();
         wrong_.reset();
-        for (std::size_t i = 0; i < bank.size(); ++i) {
-            if (bank[i].enabled) schedule(i);
+        for (std::size_t i = 0; i < guards.size(); ++i) {
+            if (guards[i].enabled) schedule(i);
         }
         find_limit();
     }
@@ -375,26 +375,27 @@ private:
 
     /// Event tolerance, which the guard must not have come within. In an interval that
     /// closes, the guard is no farther away than the sum of its distances at the ends.
-    [[nodiscard]] static double band(const Bank& bank, std::size_t i, double a, double b) noexcept
+    [[nodiscard]] static double tolerance_of(const Guards& guards, std::size_t i, double a,
+                                             double b) noexcept
     {
-        return bank.touch_of(i, std::fabs(a) + std::fabs(b));
+        return guards.touch_of(i, std::fabs(a) + std::fabs(b));
     }
 
     /// Defers the guard, starting from this check.
-    void rest_from(std::size_t i, const Check& at, Mode mode, const Bank& bank)
+    void rest_from(std::size_t i, const Check& at, Mode mode, const Guards& guards)
     {
         LastCheck& check = checks_[i];
         Check now = at;
-        now.bound = bound(i, at, mode, bank[i].side);
-        plan_after(i, check, now, mode, bank);
+        now.bound = bound(i, at, mode, guards[i].side);
+        plan_after(i, check, now, mode, guards);
     }
 
     /// Defers the guard from the end of a step that has been examined, and queues its deadline.
-    void defer_from(std::size_t i, Check end, Mode mode, const Bank& bank)
+    void defer_from(std::size_t i, Check end, Mode mode, const Guards& guards)
     {
-        end.bound = bound(i, end, mode, bank[i].side);
-        check_change(i, last_check(i), end, bank);
-        plan_after(i, checks_[i], end, mode, bank);
+        end.bound = bound(i, end, mode, guards[i].side);
+        check_change(i, last_check(i), end, guards);
+        plan_after(i, checks_[i], end, mode, guards);
         schedule(i);
     }
 
@@ -411,7 +412,8 @@ private:
         return answer.cleared;
     }
 
-    void plan_after(std::size_t i, LastCheck& check, const Check& at, Mode mode, const Bank& bank)
+    void plan_after(std::size_t i, LastCheck& check, const Check& at, Mode mode,
+                    const Guards& guards)
     {
         const double passed = at.time - check.time;
         if (passed > 0) {
@@ -424,12 +426,12 @@ private:
         check.bound = at.bound;
         check.exact = at.exact;
         check.rate = std::numeric_limits<double>::quiet_NaN();
-        if (never_sleeps(bank[i])) {
+        if (never_sleeps(guards[i])) {
             check.verify = true;
             check.sure = check.hoped = -infinity;
             return;
         }
-        const double reach = band(bank, i, at.value, at.value);
+        const double reach = tolerance_of(guards, i, at.value, at.value);
         // Rounding of the time must not lengthen the covered interval.
         const double ulps = tolerances::of_time * std::fabs(at.time);
         check.sure = at.time + detector_->sure(self_, at.bound, reach) - ulps;
@@ -440,7 +442,7 @@ private:
         const double hoped = (1 - 1e-12) * detector_->hoped(self_, at.bound, check.slope, reach);
         const double ahead = std::max({hoped, cleared, encloses() ? check.interval : 0});
         check.hoped =
-            std::max(check.sure, at.time + (expects_level(check, bank[i].side) ? 0 : ahead));
+            std::max(check.sure, at.time + (expects_level(check, guards[i].side) ? 0 : ahead));
     }
 
     /// Whether a gate is likely to have a lower bound where the cover by this check ends; any bound
@@ -464,10 +466,11 @@ private:
         return record.side == Side::plateau || (bounded_ && record.info.boolean);
     }
 
-    [[nodiscard]] bool closes(const Bank& bank, std::size_t i, const Check& a, const Check& b) const
+    [[nodiscard]] bool closes(const Guards& guards, std::size_t i, const Check& a,
+                              const Check& b) const
     {
         return detector_->closes(self_, a.bound, b.bound, b.time - a.time,
-                                 band(bank, i, a.value, b.value));
+                                 tolerance_of(guards, i, a.value, b.value));
     }
 
     // --- checks ---
@@ -479,25 +482,25 @@ private:
     }
 
     /// The guard's exact value: that of the last check or another at this time, or else evaluated.
-    [[nodiscard]] double value_at(std::size_t i, const Check& at, Mode mode, const Bank& bank,
+    [[nodiscard]] double value_at(std::size_t i, const Check& at, Mode mode, const Guards& guards,
                                   Statistics& counts)
     {
         const LastCheck& check = checks_[i];
         if (check.exact && check.time == at.time) return check.value;
         if (check.later_time == at.time) return check.later_value;
         return meter_.time_guard(
-            [&] { return bank.view(i, mode, counts.guard_calls).value(at.t, *at.x); });
+            [&] { return guards.view(i, mode, counts.guard_calls).value(at.t, *at.x); });
     }
 
     /// An exact check at the start of tentative step k; for k past the last, at the end of the
     /// current step.
     [[nodiscard]] Check check_at(std::size_t i, std::size_t k, const Step<X>& step,
-                                 const Bank& bank, Statistics& counts)
+                                 const Guards& guards, Statistics& counts)
     {
         Check check = place(k, step);
-        check.value = value_at(i, check, step.mode(), bank, counts);
-        check.bound = bound(i, check, step.mode(), bank[i].side);
-        if (detector_->checks_bounds) check_bound(i, check, step.mode(), bank);
+        check.value = value_at(i, check, step.mode(), guards, counts);
+        check.bound = bound(i, check, step.mode(), guards[i].side);
+        if (detector_->checks_bounds) check_bound(i, check, step.mode(), guards);
         return check;
     }
 
@@ -515,11 +518,11 @@ private:
     /// A check by which the lower bound there or, below the surface, the upper bound covers guard
     /// i, if one does.
     [[nodiscard]] std::optional<Check> bound_at(std::size_t i, std::size_t k, const Step<X>& step,
-                                                const Bank& bank, Statistics& counts)
+                                                const Guards& guards, Statistics& counts)
     {
         if (!bounded_) return std::nullopt;
         Check check;
-        if (system_->upper_bound && bank[i].side == Side::below) {
+        if (system_->upper_bound && guards[i].side == Side::below) {
             check = place(k, step);
             check.exact = false;
             ++counts.bound_calls;
@@ -529,7 +532,7 @@ private:
             return check.value < 0 ? std::optional(check) : std::nullopt;
         }
         if (!system_->lower_bound && !detector_->level) return std::nullopt;
-        if (bank[i].side != Side::above) return std::nullopt;
+        if (guards[i].side != Side::above) return std::nullopt;
         check = place(k, step);
         check.exact = false;
         check.value = 0;
@@ -567,22 +570,22 @@ private:
     }
 
     /// Closes the interval of guard i; returns the first step that could not be closed, or `none`.
-    [[nodiscard]] std::size_t close_one(std::size_t i, const Step<X>& step, Bank& bank,
+    [[nodiscard]] std::size_t close_one(std::size_t i, const Step<X>& step, Guards& guards,
                                         Statistics& counts, double h_next);
 
     /// Encloses guard i on the interval, in as few parts as it takes; returns the first step
     /// that is not proved, or `none`. @param in_doubt  its step is known not to be
     [[nodiscard]] std::size_t enclose_one(std::size_t i, bool in_doubt, const Step<X>& step,
-                                          Bank& bank, Statistics& counts);
+                                          Guards& guards, Statistics& counts);
 
     /// Whether the range of a guard, times the sign of its side, is clear of the surface, also of a
     /// tie with the end of a step.
-    [[nodiscard]] static bool is_clear(const Bank& bank, std::size_t i, const Enclosure& range,
+    [[nodiscard]] static bool is_clear(const Guards& guards, std::size_t i, const Enclosure& range,
                                        bool may_tie) noexcept
     {
         const double size = std::fabs(range.centre) + std::fabs(range.slope) + range.radius;
         const double rounding = may_tie ? tolerances::by_rounding * size : 0;
-        return range.lower() > std::max(bank.touch_of(i, 2 * size), rounding);
+        return range.lower() > std::max(guards.touch_of(i, 2 * size), rounding);
     }
 
     /// Defers guard i from a time up to which it is proved to be clear.
@@ -600,7 +603,7 @@ private:
     struct Closing {
         std::size_t i;
         const Step<X>& step;
-        const Bank& bank;
+        const Guards& guards;
         Statistics& counts;
     };
 
@@ -612,25 +615,26 @@ private:
 
     // --- tests of the bounds ---
 
-    void check_change(std::size_t i, const Check& from, const Check& to, const Bank& bank);
+    void check_change(std::size_t i, const Check& from, const Check& to, const Guards& guards);
 
     /// Reports a guard that is across its surface although it was covered all the way between
     /// the two checks.
-    void check_covered(std::size_t i, const Check& from, const Check& to, const Bank& bank);
+    void check_covered(std::size_t i, const Check& from, const Check& to, const Guards& guards);
 
-    void blame_change(std::size_t i, const Check& from, const Check& to, const Bank& bank);
+    void blame_change(std::size_t i, const Check& from, const Check& to, const Guards& guards);
 
     void blame(std::size_t i, const Check& from, const Check& to, double allowed);
 
     /// Evaluates a deferred guard, and reports a bound as wrong that the value contradicts. A guard
     /// beyond its surface is reported whatever its bounds allow there.
-    void watch_sleeper(std::size_t i, Check now, Mode mode, const Bank& bank, Statistics& counts);
+    void watch_sleeper(std::size_t i, Check now, Mode mode, const Guards& guards,
+                       Statistics& counts);
 
     /// Reports a declared bound that an exact value contradicts. Beyond the surface a bound may
     /// have ended at 0.
-    void check_bound(std::size_t i, const Check& check, Mode mode, const Bank& bank);
+    void check_bound(std::size_t i, const Check& check, Mode mode, const Guards& guards);
 
-    void check_against(double bound, std::size_t i, const Check& check, const Bank& bank);
+    void check_against(double bound, std::size_t i, const Check& check, const Guards& guards);
 
     SystemAt<X> system_;
     const DetectorTable<X>* detector_;

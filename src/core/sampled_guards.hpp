@@ -27,7 +27,7 @@ class SampledGuards {
 protected:
     using Doubles = PerGuard<double, single>;
 
-    SampledGuards(const SystemAt<X>& system, const BankRules& rules, bool backward)
+    SampledGuards(const SystemAt<X>& system, const GuardRules& rules, bool backward)
         : system_(system), rules_(rules), backward_(backward)
     {
         const std::size_t count = system->guard_count(system.adapter());
@@ -231,7 +231,7 @@ protected:
     }
 
     SystemAt<X> system_;
-    BankRules rules_;
+    GuardRules rules_;
     bool backward_;
     bool selective_ = false;  ///< whether any guard is disabled or has no rate
     bool idle_ = true;

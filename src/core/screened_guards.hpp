@@ -31,7 +31,7 @@ class ScreenedGuards : public SampledGuards<X, single> {
 protected:
     using typename Guards::Doubles;
 
-    ScreenedGuards(const SystemAt<X>& system, const BankRules& rules, bool backward)
+    ScreenedGuards(const SystemAt<X>& system, const GuardRules& rules, bool backward)
         : Guards(system, rules, backward), suspects_(size()), marks_(size())
     {
         if (size() == 0) return;
@@ -40,13 +40,13 @@ protected:
         }
         for (auto* numbers : {&sign_, &g0_, &rate0_, &g1_, &rate1_}) numbers->resize(size());
         for (const GuardRecord& record : records_) {
-            bands_ = bands_ || record.info.touch > 0;
+            touches_ = touches_ || record.info.touch > 0;
             const int degree = record.info.degree;
             signs_ = signs_ || record.info.boolean;
             of_time_ = of_time_ && degree >= 1 && degree <= 3 && !record.info.boolean;
             linear_ = linear_ && record.info.degree == 1 && !record.info.boolean;
         }
-        linear_ = linear_ && !bands_ && rules.screening == Screening::extremum;
+        linear_ = linear_ && !touches_ && rules.screening == Screening::extremum;
     }
 
 public:
@@ -171,7 +171,7 @@ public:
     [[nodiscard]] bool doubtful(double h) noexcept
     {
         if (single && ends_beyond(0)) return true;
-        if (checked() && !waiting_ && !bands_) {
+        if (checked() && !waiting_ && !touches_) {
             if (are_few()) {
                 return with_screen([&](auto screen) __attribute__((always_inline)) {
                     const auto doubt = in_doubt(screen, h);
@@ -282,10 +282,11 @@ public:
         if (!single && records_[i].dips) return true;
         if (has_series(i)) return !is_clear_of_series(i, h);
         if (ends_beyond(i)) return true;
-        const double band = sign_[i] * records_[i].info.touch;  // worth a check if it is reached
+        const double tolerance =
+            sign_[i] * records_[i].info.touch;  // worth a check if it is reached
         const bool suspected = with_screen([&](auto screen) __attribute__((always_inline)) {
-            return screen.suspects(sign_[i], {.value = g0_[i] - band, .rate = rate0_[i]},
-                                   {.s = h, .value = g1_[i] - band, .rate = rate1_[i]});
+            return screen.suspects(sign_[i], {.value = g0_[i] - tolerance, .rate = rate0_[i]},
+                                   {.s = h, .value = g1_[i] - tolerance, .rate = rate1_[i]});
         });
         return suspected || !is_finite(g1_[i]) || (checked() && hides(i, h));
     }
@@ -490,7 +491,7 @@ protected:
     {
         suspects_.clear();
         screened_ = as_screened_ = true;
-        if (are_few() || bands_ || dips_ || series_.coefficients) {
+        if (are_few() || touches_ || dips_ || series_.coefficients) {
             for (std::size_t i = 0; i < size(); ++i) add_if_suspicious(i, h);
             return;
         }
@@ -593,7 +594,7 @@ protected:
     SeriesTerms series_;
     bool starts_phase_ = false;
     bool waiting_ = false;      ///< whether any guard may be on a plateau
-    bool bands_ = false;        ///< whether any guard declares a tolerance for touches
+    bool touches_ = false;      ///< whether any guard declares a tolerance for touches
     bool signs_ = false;        ///< whether only the sign of any guard has a meaning
     bool of_time_ = true;       ///< whether all guards are of degree 3 or less
     bool linear_ = true;        ///< whether all guards are of degree 1, and are screened as such

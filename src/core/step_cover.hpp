@@ -19,7 +19,7 @@
 
 #include "core/enclosed_intervals.hpp"
 #include "core/event_hit.hpp"
-#include "core/guard_bank.hpp"
+#include "core/guard_table.hpp"
 #include "core/step.hpp"
 #include "ricochet/detail/cubic_check.hpp"
 #include "ricochet/detail/detector_table.hpp"
@@ -39,7 +39,7 @@ struct Covered {
 
 template <class X, bool single>
 class StepCover {
-    using Bank = GuardBank<X, single>;
+    using Guards = GuardTable<X, single>;
 
 public:
     /// Keeps a reference to the detector.
@@ -85,7 +85,7 @@ public:
 
     /// The first event of a guard between `start`, where it is on `side`, and `end`, as far as its
     /// bounds tell. `inside`: a further value, if it lies between them.
-    [[nodiscard]] Covered first_event(const Step<X>& step, const Bank& bank,
+    [[nodiscard]] Covered first_event(const Step<X>& step, const Guards& guards,
                                       const CoreGuard<X>& guard, Side side, GuardSample start,
                                       const GuardSample& inside, const GuardSample& end);
 
@@ -117,7 +117,7 @@ private:
 
     struct Task {
         const Step<X>& step;
-        const Bank& bank;
+        const Guards& guards;
         const CoreGuard<X>& guard;
         Side side;
     };
@@ -131,7 +131,7 @@ private:
     [[nodiscard]] static double touch(const Task& task, const Node& a, const Node& b) noexcept
     {
         const double sum = std::fabs(a.bound.distance) + std::fabs(b.bound.distance);
-        return task.bank.touch_of(task.guard.which(), sum);
+        return task.guards.touch_of(task.guard.which(), sum);
     }
     [[nodiscard]] static bool is_beyond(const Task& task, const Node& node) noexcept
     {
@@ -226,7 +226,7 @@ private:
 };
 
 template <class X, bool single>
-inline Covered StepCover<X, single>::first_event(const Step<X>& step, const Bank& bank,
+inline Covered StepCover<X, single>::first_event(const Step<X>& step, const Guards& guards,
                                                  const CoreGuard<X>& guard, Side side,
                                                  GuardSample start, const GuardSample& inside,
                                                  const GuardSample& end)
@@ -235,9 +235,9 @@ inline Covered StepCover<X, single>::first_event(const Step<X>& step, const Bank
     if (last_ && *last_ == interval) return found_;
     last_ = interval;
     found_ = {};
-    if (start.s == 0 && bank.starts_at_event(guard.which(), step)) start.value = 0;
+    if (start.s == 0 && guards.starts_at_event(guard.which(), step)) start.value = 0;
     while (start.s < end.s) {
-        const Task task{step, bank, guard, side};
+        const Task task{step, guards, guard, side};
         const std::optional<GuardSample> beyond =
             detector_->along ? enclose(task, start, end) : divide(task, start, inside, end);
         if (!beyond) break;
@@ -304,7 +304,7 @@ inline auto StepCover<X, single>::enclose(const Task& task, const GuardSample& s
         refined_ = true;
         return task.guard.value(step.time(s), state_at(step, s));
     };
-    const auto touch_of = [&](double size) { return task.bank.touch_of(i, 2 * size); };
+    const auto touch_of = [&](double size) { return task.guards.touch_of(i, 2 * size); };
     const auto is_across = [&](double value) { return sign * value < -touch_of(std::fabs(value)); };
     const double whole = end.s - start.s;
     const double left_over = std::min(last_part * whole, finest_part * step.h());
@@ -419,17 +419,17 @@ inline double StepCover<X, single>::place(const Task& task, const Node& lo, cons
                                           double& need)
 {
     constexpr double nowhere = std::numeric_limits<double>::quiet_NaN();
-    const double band = touch(task, lo, hi);
+    const double tolerance = touch(task, lo, hi);
     const double width = hi.s - lo.s;
-    const bool from_clear = lo.bound.distance > band;
-    const bool to_clear = hi.bound.distance > band;
+    const bool from_clear = lo.bound.distance > tolerance;
+    const bool to_clear = hi.bound.distance > tolerance;
     if (from_clear != to_clear) {
         return from_clear ? place_beside(task, lo, hi, need) : place_beside(task, hi, lo, need);
     }
     if (from_clear) {
-        if (detector_->closes(self_, lo.bound, hi.bound, width, band)) return nowhere;
-        const double behind = detector_->sure(self_, lo.bound, band);
-        const double ahead = detector_->sure(self_, hi.bound, band);
+        if (detector_->closes(self_, lo.bound, hi.bound, width, tolerance)) return nowhere;
+        const double behind = detector_->sure(self_, lo.bound, tolerance);
+        const double ahead = detector_->sure(self_, hi.bound, tolerance);
         const double from = lo.s + behind;
         const double to = hi.s - ahead;
         const double speed = (1 + detector_->margin) * std::max(lo.bound.speed, hi.bound.speed);

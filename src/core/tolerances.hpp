@@ -74,6 +74,6 @@ inline constexpr double of_drift = 0x1p20;
 inline constexpr std::size_t remembered_components = 64;
 /// Events of one guard at an instant after which the instant counts as endless. An avalanche has
 /// one of each of its guards.
-inline constexpr std::uint32_t events_at_once = 1000;
+inline constexpr std::uint32_t events_at_instant = 1000;
 
 }  // namespace ricochet::detail::tolerances

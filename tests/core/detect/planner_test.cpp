@@ -30,7 +30,7 @@ namespace {
 
 using X = std::array<double, 1>;
 using Core = detail::CoreState<X>;
-using Bank = detail::GuardBank<Core, false>;
+using Table = detail::GuardTable<Core, false>;
 using Planner = detail::Planner<Core, false>;
 using Guards = std::vector<std::size_t>;
 constexpr double rounding = 1e-13;
@@ -105,16 +105,16 @@ public:
           locator_(detail::locator_table<Newton>()),
           finders_{detector_, &planned_, locator_, &newton_},
           step(clock_, t, X{t}, 0, backward),
-          bank(system_, detail::BankRules::of(detector_, system_), backward),
-          search(system_, step.x0(), bank.size(), finders_, {.t_end = 100}),
-          planner(system_, finders_, step.x0(), backward, bank.size())
+          table(system_, detail::GuardRules::of(detector_, system_), backward),
+          search(system_, step.x0(), table.size(), finders_, {.t_end = 100}),
+          planner(system_, finders_, step.x0(), backward, table.size())
     {
-        bank.sample_start(step, counts.guard_calls, 1);
-        for (std::size_t i = 0; i < bank.size(); ++i) {
-            bank.arm(i, detail::side_of(bank.g0(i)));
+        table.sample_start(step, counts.guard_calls, 1);
+        for (std::size_t i = 0; i < table.size(); ++i) {
+            table.arm(i, detail::side_of(table.g0(i)));
         }
         counts = {};
-        planner.begin(step, bank);
+        planner.begin(step, table);
     }
     Plan(const Plan&) = delete;
     Plan& operator=(const Plan&) = delete;
@@ -136,7 +136,7 @@ public:
     }
     [[nodiscard]] std::size_t close(double h_next = 0)
     {
-        return planner.close(step, bank, counts, h_next);
+        return planner.close(step, table, counts, h_next);
     }
     [[nodiscard]] Guards judged() const
     {
@@ -155,7 +155,7 @@ private:
 
 public:
     test::StepOf<Dopri5, System, X> step;
-    Bank bank;
+    Table table;
     detail::EventSearch<Core, false> search;
     Planner planner;
     Statistics counts;
@@ -170,7 +170,7 @@ TEST(Planner, TheDeadlineIsTheDistanceOverTheSpeed)
         EXPECT_LT(plan.planner.limit(), limit);
         EXPECT_TRUE(plan.planner.covers(plan.planner.limit()));
         EXPECT_FALSE(plan.planner.covers(limit));
-        EXPECT_TRUE(std::as_const(plan.bank)[0].deferred);
+        EXPECT_TRUE(std::as_const(plan.table)[0].deferred);
     }
 }
 
@@ -190,8 +190,8 @@ TEST(Planner, TheEarliestDeadlineCountsOnEitherSide)
     EXPECT_NEAR(Plan(Clock{{resting(3, 1), resting(-2, 10)}}).planner.limit(), 0.2, rounding);
     // A guard that is disabled has none.
     Plan plan(Clock{{resting(3, 1), resting(2, 10)}});
-    plan.bank[1].enabled = false;
-    plan.planner.begin(plan.step, plan.bank);
+    plan.table[1].enabled = false;
+    plan.planner.begin(plan.step, plan.table);
     EXPECT_NEAR(plan.planner.limit(), 3, rounding);
 }
 
@@ -262,9 +262,9 @@ TEST(Planner, TheFirstStepThatNoTwoChecksCloseIsInDoubt)
     EXPECT_EQ(plan.close(), 0u);
     EXPECT_EQ(plan.judged(), Guards{0});
     EXPECT_EQ(plan.counts.guard_calls, 5u);  // its values there are known
-    plan.planner.wake(plan.step, plan.bank, plan.counts, 0.25);
-    EXPECT_NEAR(plan.bank.g0(0), 0.09, rounding);
-    EXPECT_NEAR(plan.bank.g1(0), 0.14, rounding);
+    plan.planner.wake(plan.step, plan.table, plan.counts, 0.25);
+    EXPECT_NEAR(plan.table.g0(0), 0.09, rounding);
+    EXPECT_NEAR(plan.table.g1(0), 0.14, rounding);
 }
 
 TEST(Planner, AnIntervalIsHalvedAtTheStartsOfItsSteps)
@@ -314,15 +314,15 @@ TEST(Planner, AGuardInDoubtIsWokenAndThenDeferredFromTheEndOfItsStep)
     plan.overrun(1);
     ASSERT_EQ(plan.close(), 0u);
     ASSERT_EQ(plan.judged(), Guards{0});
-    plan.planner.wake(plan.step, plan.bank, plan.counts, 1);
-    EXPECT_FALSE(std::as_const(plan.bank)[0].deferred);
-    EXPECT_TRUE(std::as_const(plan.bank)[1].deferred);
-    EXPECT_EQ(plan.bank.g0(0), 0.3);
-    EXPECT_EQ(plan.bank.g1(0), 0.4);
-    EXPECT_NEAR(plan.bank.start(0).rate, 0.1, 1e-9);
-    EXPECT_NEAR(plan.bank.end(0, 1).rate, 0.1, 1e-9);
-    plan.planner.settle(plan.step, plan.bank, plan.counts);
-    EXPECT_TRUE(std::as_const(plan.bank)[0].deferred);
+    plan.planner.wake(plan.step, plan.table, plan.counts, 1);
+    EXPECT_FALSE(std::as_const(plan.table)[0].deferred);
+    EXPECT_TRUE(std::as_const(plan.table)[1].deferred);
+    EXPECT_EQ(plan.table.g0(0), 0.3);
+    EXPECT_EQ(plan.table.g1(0), 0.4);
+    EXPECT_NEAR(plan.table.start(0).rate, 0.1, 1e-9);
+    EXPECT_NEAR(plan.table.end(0, 1).rate, 0.1, 1e-9);
+    plan.planner.settle(plan.step, plan.table, plan.counts);
+    EXPECT_TRUE(std::as_const(plan.table)[0].deferred);
     EXPECT_TRUE(plan.judged().empty());
     EXPECT_NEAR(plan.planner.limit(), 1.4, rounding);
     EXPECT_EQ(plan.counts.guard_calls, 5u);  // at the end once, and for two rates
@@ -343,10 +343,10 @@ TEST(Planner, AStepInDoubtIsDividedUntilItIsCoveredOrAnEventIsSeen)
         plan.overrun(1);
         ASSERT_EQ(plan.close(), 0u);
         plan.search.cover().begin();
-        plan.bank.forget_dips();
-        plan.planner.close_inside(plan.step, plan.bank, plan.search, plan.counts);
+        plan.table.forget_dips();
+        plan.planner.close_inside(plan.step, plan.table, plan.search, plan.counts);
         EXPECT_EQ(plan.judged(), least > 0 ? Guards{} : Guards{0});
-        EXPECT_EQ(std::as_const(plan.bank)[0].dips, least < 0);
+        EXPECT_EQ(std::as_const(plan.table)[0].dips, least < 0);
         if (least > 0) {
             EXPECT_NEAR(plan.planner.limit(), 1.275, rounding);
         }
@@ -413,7 +413,7 @@ TEST(Planner, NothingIsDeferredBeyondTheEndOfTheRun)
     for (const double end : {0.25, 0.75}) {
         Plan plan(Clock{{resting(9, 1), too_fast()}});
         plan.pass(end);
-        plan.planner.check_last(plan.step, plan.bank, plan.counts);
+        plan.planner.check_last(plan.step, plan.table, plan.counts);
         EXPECT_EQ(plan.counts.guard_calls, 2u);
         // At 0.25 it has not crossed, and only its change would tell.
         ASSERT_EQ(plan.planner.wrong().has_value(), end == 0.75);
@@ -432,7 +432,7 @@ TEST(Planner, ASleeperIsTestedEvery64thStepIfBoundsAreChecked)
         ASSERT_TRUE(plan.step.attempt(0.25));
         const auto pass = [&](int steps) {
             for (int k = 0; k < steps; ++k) {
-                plan.planner.sample_sleeper(plan.step, plan.bank, plan.counts);
+                plan.planner.sample_sleeper(plan.step, plan.table, plan.counts);
             }
         };
         pass(63);
@@ -487,7 +487,7 @@ TEST(Planner, AWrongLowerBoundAtTheEndOfTheRunIsNamed)
     ASSERT_EQ(plan.close(), Planner::none);
     ASSERT_EQ(plan.counts.guard_calls, 0u);
     plan.step.accept();
-    plan.planner.check_last(plan.step, plan.bank, plan.counts);
+    plan.planner.check_last(plan.step, plan.table, plan.counts);
     ASSERT_TRUE(plan.planner.wrong());
     EXPECT_TRUE(plan.planner.wrong()->lower_bound);
     EXPECT_EQ(plan.planner.wrong()->value, -0.25);
@@ -508,7 +508,7 @@ TEST(Planner, GoesOnFromTheNumbersOfItsChecks)
     other.planner.visit([&](auto& number) {
         number = static_cast<std::remove_reference_t<decltype(number)>>(saved[next++]);
     });
-    other.planner.restore(other.bank);
+    other.planner.restore(other.table);
     EXPECT_EQ(other.planner.limit(), plan.planner.limit());
 }
 

@@ -26,7 +26,7 @@ namespace {
 
 using X = std::array<double, 1>;
 using Core = detail::CoreState<X>;
-using Bank = detail::GuardBank<Core, false>;
+using Table = detail::GuardTable<Core, false>;
 using Search = detail::EventSearch<Core, false>;
 using Set = std::vector<std::size_t>;
 /// Roots are of order one, and located within neighbouring doubles of them.
@@ -87,40 +87,40 @@ public:
           locator_(detail::locator_table<Newton>()),
           finders_{detector_, &extremum_, locator_, &newton_},
           step(clock_, 0, X{}),
-          bank(system_, detail::BankRules::of(detector_, system_), false),
-          search(system_, step.x0(), bank.size(), finders_, options)
+          table(system_, detail::GuardRules::of(detector_, system_), false),
+          search(system_, step.x0(), table.size(), finders_, options)
     {
         EXPECT_TRUE(step.attempt(1));
-        bank.sample_start(step, calls, 1);
-        for (std::size_t i = 0; i < bank.size(); ++i) {
-            bank[i].acting = bank[i].info.resets;
-            bank.arm(i, detail::side_of(bank.g0(i)));
+        table.sample_start(step, calls, 1);
+        for (std::size_t i = 0; i < table.size(); ++i) {
+            table[i].acting = table[i].info.resets;
+            table.arm(i, detail::side_of(table.g0(i)));
         }
-        bank.sample_end(step, calls);
+        table.sample_end(step, calls);
         Core inside = step.x0();
         step.peek(detail::CubicCheck::inside, inside);
-        bank.sample_inside(step, inside, calls);
+        table.sample_inside(step, inside, calls);
         search.begin(step.x0());
-        bank.begin_search(1);
+        table.begin_search(1);
     }
     InStep(const InStep&) = delete;
     InStep& operator=(const InStep&) = delete;
 
     [[nodiscard]] bool find(bool time_event_due = false)
     {
-        return search.find_set(step, bank, time_event_due, calls);
+        return search.find_set(step, table, time_event_due, calls);
     }
     [[nodiscard]] Set fired() { return {search.fired().begin(), search.fired().end()}; }
     void note_crossings(std::size_t i)
     {
-        search.note_crossings(step, bank, i, bank.end(i, 1), calls);
+        search.note_crossings(step, table, i, table.end(i, 1), calls);
     }
     /// Notes the guards of a set that changes nothing, and goes on behind it.
     void go_on()
     {
         for (const std::size_t i : search.fired()) {
             search.note(i, search.side_left(i), true);
-            search.pass(step, bank, i, calls);
+            search.pass(step, table, i, calls);
         }
     }
     [[nodiscard]] double guard(std::size_t i, const Core& x) const
@@ -140,7 +140,7 @@ private:
 
 public:
     test::StepOf<Dopri5, Clock, X> step;
-    Bank bank;
+    Table table;
     Search search;
     std::uint64_t calls = 0;
 };
@@ -254,7 +254,7 @@ TEST(EventSearch, ATouchIsNoCrossing)
     EXPECT_EQ(touches.search.notes()[0].kind, EventKind::touch);
     EXPECT_NEAR(touches.search.notes()[0].where.root, 0.5, 1e-8);  // of a double root
     EXPECT_EQ(touches.search.noted(0), 0u);
-    EXPECT_EQ(touches.bank[0].next, Side::above);
+    EXPECT_EQ(touches.table[0].next, Side::above);
     touches.search.begin(touches.step.x0());
     EXPECT_TRUE(touches.search.notes().empty());
     EXPECT_FALSE(InStep({dip(0.5, 0, {.crossing = Crossing::either})}).find());
@@ -280,8 +280,8 @@ TEST(EventSearch, EveryCrossingOfARecordedGuardIsNoted)
     in.note_crossings(0);
     EXPECT_EQ(in.search.noted(0), 2u);
     EXPECT_EQ(in.search.noted(1), 1u);
-    EXPECT_EQ(in.bank[0].next, Side::above);
-    EXPECT_EQ(in.bank[1].next, Side::below);
+    EXPECT_EQ(in.table[0].next, Side::above);
+    EXPECT_EQ(in.table[1].next, Side::below);
 
     in.search.keep_notes_until(0.7);
     const auto& notes = in.search.notes();
@@ -320,12 +320,12 @@ TEST(EventSearch, AGuardLeavesItsPlateauWhereItEnds)
     // It is 0 up to 1/4, and falls from there; the event is to leave it downward.
     InStep in({{[](double t) { return t <= 0.25 ? 0 : 0.25 - t; },
                 [](double t) { return t <= 0.25 ? 0.0 : -1.0; }}});
-    in.bank.await_none();
-    in.bank.await(0, Side::above);
-    in.bank.arm(0, Side::plateau);
-    ASSERT_TRUE(in.bank.leaves_plateau(0));
-    in.search.end_plateau(in.step, in.bank, 0, in.calls);
-    in.bank.begin_search(1);
+    in.table.await_none();
+    in.table.await(0, Side::above);
+    in.table.arm(0, Side::plateau);
+    ASSERT_TRUE(in.table.leaves_plateau(0));
+    in.search.end_plateau(in.step, in.table, 0, in.calls);
+    in.table.begin_search(1);
     ASSERT_TRUE(in.find());
     EXPECT_EQ(in.search.side_left(0), Side::above);
     EXPECT_NEAR(in.search.at(), 0.25, rounding);
@@ -339,7 +339,7 @@ TEST(EventSearch, AGuardThatHasASignAloneIsBisectedToNeighbouringDoubles)
         EXPECT_GE(in.search.at(), from);
         EXPECT_LE(in.search.at(), from + rounding);
         EXPECT_LT(in.guard(0, in.search.before()), 0);  // its condition holds there
-        EXPECT_TRUE(in.search.meet_conditions(in.step, in.bank, in.calls));
+        EXPECT_TRUE(in.search.meet_conditions(in.step, in.table, in.calls));
         EXPECT_LT(in.search.where(0).lo, from);
     }
     // One that returns is seen at the place inside the step.
@@ -361,14 +361,14 @@ TEST(EventSearch, ASetIsMovedToWhereItsConditionHolds)
         InStep in({{[=](double t) { return c - t * t; }, [](double t) { return -2 * t; }}});
         ASSERT_TRUE(in.find());
         unmet += in.guard(0, in.search.before()) > 0;
-        EXPECT_TRUE(in.search.meet_conditions(in.step, in.bank, in.calls));
+        EXPECT_TRUE(in.search.meet_conditions(in.step, in.table, in.calls));
         EXPECT_LE(in.guard(0, in.search.before()), 0);
         EXPECT_NEAR(in.search.at(), std::sqrt(c), rounding);
         EXPECT_EQ(in.search.before()[0], in.search.at() + in.search.at_remainder());
         EXPECT_EQ(in.search.value_at_set(0), -in.guard(0, in.search.before()));
         // A little farther it is beyond its surface.
         Core x = in.search.before();
-        const double t = in.search.go_beyond(in.step, in.bank, 0, x, in.calls);
+        const double t = in.search.go_beyond(in.step, in.table, 0, x, in.calls);
         EXPECT_GE(t, in.search.at());
         EXPECT_NEAR(t, std::sqrt(c), 2 * rounding);
         EXPECT_LT(in.guard(0, x), 0);
@@ -383,15 +383,15 @@ TEST(EventSearch, ARecordedGuardCrossesWithASetWithinRoundingAlone)
     ASSERT_TRUE(in.find());
     EXPECT_EQ(in.fired(), Set{0});
     for (const std::size_t i : {1u, 2u}) {
-        const auto sample = in.search.sample_at_set(in.step, in.bank, i, in.calls);
+        const auto sample = in.search.sample_at_set(in.step, in.table, i, in.calls);
         EXPECT_NEAR(sample.value, i == 1 ? 0 : 5e-9, 1e-15);
         EXPECT_EQ(sample.rate, -5);
-        EXPECT_EQ(in.search.crosses_with_set(in.step, in.bank, i, sample), i == 1);
+        EXPECT_EQ(in.search.crosses_with_set(in.step, in.table, i, sample), i == 1);
     }
-    in.search.note_at_set(in.bank, 1, Side::above, -5);
+    in.search.note_at_set(in.table, 1, Side::above, -5);
     EXPECT_EQ(in.search.noted(1), 1u);
     EXPECT_EQ(in.search.notes()[0].where.root, in.search.at());
-    EXPECT_EQ(in.bank[1].side, Side::below);
+    EXPECT_EQ(in.table[1].side, Side::below);
 }
 
 TEST(EventSearch, AGuardThatTiesWithTheEndJoinsTheSetThere)

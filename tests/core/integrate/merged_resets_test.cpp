@@ -47,13 +47,13 @@ public:
         std::vector<std::size_t> fired(resets_.size());
         for (std::size_t i = 0; i < fired.size(); ++i) fired[i] = i;
         detail::MergedResets<State> merged(before);
-        merged.apply({table_, this}, Bank{}, {fired, timed_ != nullptr, mode, 0}, before,
+        merged.apply({table_, this}, Table{}, {fired, timed_ != nullptr, mode, 0}, before,
                      Stands{*this});
         return merged;
     }
 
 private:
-    struct Bank {
+    struct Table {
         struct Record {
             GuardInfo info;
         };

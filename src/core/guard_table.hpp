@@ -23,7 +23,7 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-class GuardBank : public ScreenedGuards<X, single> {
+class GuardTable : public ScreenedGuards<X, single> {
     using Guards = ScreenedGuards<X, single>;
     using typename Guards::Doubles;
 
@@ -32,7 +32,7 @@ public:
     using Guards::size;
     using Guards::view;
 
-    GuardBank(const SystemAt<X>& system, const BankRules& rules, bool backward)
+    GuardTable(const SystemAt<X>& system, const GuardRules& rules, bool backward)
         : Guards(system, rules, backward),
           keeps_rows_(size() > 1 || system->moded),
           timed_(system->timed())
@@ -153,7 +153,7 @@ public:
     [[nodiscard]] bool is_steady() const noexcept
     {
         if (size() == 0) return true;
-        return single && sign_[0] != 0 && !waiting_ && !bands_ && !selective_;
+        return single && sign_[0] != 0 && !waiting_ && !touches_ && !selective_;
     }
     /// @param t  [s] start of the next step
     void lend(QuietRun& run, double t) const noexcept
@@ -248,7 +248,7 @@ public:
     [[nodiscard]] bool starts_at_event(std::size_t i, const Step<X>& step) const noexcept
     {
         const GuardRecord& record = records_[i];
-        return departs(record, step) && std::fabs(g0_[i]) <= record.band;
+        return departs(record, step) && std::fabs(g0_[i]) <= record.tolerance;
     }
 
     /// The largest |g| that the ends of a step of length h suggest.
@@ -287,14 +287,14 @@ public:
         GuardRecord& record = records_[i];
         const double g = g0_[i];
         const bool as_before = !record.fired && !record.newly_enabled && side_of(g) == record.side;
-        const bool clear = std::fabs(g) > record.band && std::isfinite(g);
+        const bool clear = std::fabs(g) > record.tolerance && std::isfinite(g);
         const bool kept_out = record.info.unilateral && record.side == Side::below;
         if (!(as_before && clear) || kept_out) return false;
         record.estimated = false;
         record.departs = false;
         record.from = 0;
         arm(i, record.side);
-        if constexpr (!single) at_rest_[i] = record.band == 0 && !record.deferred ? 1 : 0;
+        if constexpr (!single) at_rest_[i] = record.tolerance == 0 && !record.deferred ? 1 : 0;
         return true;
     }
 
@@ -322,10 +322,11 @@ public:
         for_each_not_at_rest([](GuardRecord& record) { record.fired = false; });
     }
     /// Makes the event tolerances those that have been noted for the set, or zero.
-    void take_bands() noexcept
+    void take_tolerances() noexcept
     {
-        for_each_not_at_rest(
-            [](GuardRecord& record) { record.band = std::exchange(record.noted.band, 0); });
+        for_each_not_at_rest([](GuardRecord& record) {
+            record.tolerance = std::exchange(record.noted.tolerance, 0);
+        });
     }
 
     /// A guard as it is in the middle of a search, to be put back.
@@ -476,7 +477,7 @@ public:
             visit(record.last);
             visit(record.last_side);
             visit(record.returned);
-            visit(record.band);
+            visit(record.tolerance);
             visit(record.turned);
             visit(record.departs);
             visit(record.awaited);
@@ -545,7 +546,6 @@ private:
     using Guards::as_screened_;
     using Guards::at_rest_;
     using Guards::backward_;
-    using Guards::bands_;
     using Guards::checked_;
     using Guards::forget_screening;
     using Guards::g0_;
@@ -564,6 +564,7 @@ private:
     using Guards::sign_;
     using Guards::suspects_;
     using Guards::system_;
+    using Guards::touches_;
     using Guards::waiting_;
     using typename Guards::Checked;
 
