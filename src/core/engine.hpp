@@ -24,33 +24,23 @@
 #include <utility>
 #include <vector>
 
+#include "core/endless_sets.hpp"
 #include "core/event_search.hpp"
 #include "core/guard_life.hpp"
+#include "core/guard_rounding.hpp"
 #include "core/guard_table.hpp"
+#include "core/held_components.hpp"
 #include "core/merged_resets.hpp"
 #include "core/metering.hpp"
 #include "core/planner.hpp"
 #include "core/step.hpp"
+#include "core/time_events.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/refusals.hpp"
 #include "ricochet/options.hpp"
 #include "ricochet/run.hpp"
 
 namespace ricochet::detail {
-
-/// One of the sets that follow each other at an instant.
-template <class X>
-struct Cascade {
-    X x;
-    Mode mode = 0;
-    boost::container::small_vector<std::size_t, 8> fired{};
-
-    [[nodiscard]] bool is(const X& other, Mode in, std::span<const std::size_t> set) const
-    {
-        return mode == in && std::equal(fired.begin(), fired.end(), set.begin(), set.end()) &&
-               same_state(x, other);
-    }
-};
 
 /// Converts to `false` as a compile-time constant.
 struct Never {
@@ -85,10 +75,12 @@ protected:
           step_(system_, *setup.kernel, x0, options),
           guards_(system_, GuardRules::of(setup.detector, system_), backward_),
           search_(system_, x0, guards_.size(), finders_, options_),
+          time_events_(system_, backward_, options.continues),
           resets_(x0),
           left_rate_(x0),
           left_start_(x0),
-          cascade_{x0}
+          sets_(x0),
+          holds_(system_, step_, guards_, run_.statistics.guard_calls, backward_)
     {
         const Screening screening = setup.detector.screening;
         may_be_on_series_ = !defers_ && !predicts_ &&
@@ -161,8 +153,17 @@ protected:
 
     /// Change of guard i at the start of the step that may come from rounding of the time and of
     /// the state, by 8 units in the last place of each component.
-    [[nodiscard]] double rounding_of(std::size_t i);
-    [[nodiscard]] double rounding_of(std::size_t i, Mode mode, double t, const X& x);
+    [[nodiscard]] double rounding_of(std::size_t i)
+    {
+        return rounding_of(i, step_.mode(), step_.time(0), step_.x0());
+    }
+    [[nodiscard]] double rounding_of(std::size_t i, Mode mode, double t, const X& x)
+    {
+        return detail::rounding_of(guards_.view(i, mode, calls()), step_, t, x);
+    }
+
+    /// Time [s] of the next time event; infinity: there is none.
+    [[nodiscard]] double time_event() const noexcept { return time_events_.next(); }
 
     [[nodiscard]] std::uint64_t& calls() noexcept { return run_.statistics.guard_calls; }
 
@@ -205,12 +206,10 @@ protected:
 
     // --- time events ---
 
-    /// Reason for which a time event is asked for.
-    enum class After : std::uint8_t { start, restart, set, time_event };
+    using After = typename TimeEvents<X>::After;
 
-    /// Finds the next time event at the start of the step. An event of a timer in the state, or of
-    /// a list, may be due there. Any other event has to lie ahead: otherwise it would be lost, with
-    /// all that follow it, and the run ends or is refused.
+    /// Finds the next time event at the start of the step. Where that is lost, the run ends or is
+    /// refused.
     void find_time_event(After what);
 
     /// Asks a timer in the state, which a set or a rest may have started or cancelled.
@@ -219,14 +218,8 @@ protected:
         if (system_->next_time_event_at && !ended_) find_time_event(After::set);
     }
 
-    /// Whether the state, or the list, has a time event at the start of the step.
-    [[nodiscard]] bool is_due_here(After what);
-
     /// Applies a time event that is due at the start of the step, after others of this instant.
     [[nodiscard]] bool apply_due_time_event();
-
-    /// Whether the timers in the state have shown to be without an end at this instant.
-    [[nodiscard]] bool timer_is_endless();
 
     /// Applies a set without guards at the start of the step: a time event, or a change that the
     /// stepper has located. `settle` deals with its consequences.
@@ -250,7 +243,7 @@ protected:
     /// After a time event the flow is that of the double after it, where it jumps there.
     void start_beyond_time_event()
     {
-        if (timed_ && passed_ == step_.start().value) step_.start_beyond(options_.t_end);
+        if (timed_ && time_events_.was_at(step_.start().value)) step_.start_beyond(options_.t_end);
     }
 
     // --- finding ---
@@ -421,7 +414,7 @@ protected:
     /// @param located  the guards have fired inside the step, not at its start
     void transform(bool on_time, bool located)
     {
-        const double t = on_time ? time_event_ : time_of_set();
+        const double t = on_time ? time_event() : time_of_set();
         resets_.apply(system_, guards_, {search_.fired().span(), on_time, step_.mode(), t},
                       search_.before(), Stands{*this, t, located});
         if (phases_) decide(on_time, t);
@@ -565,16 +558,10 @@ protected:
     /// instant, or a fired guard has come to rest, and `settle` is due again.
     [[nodiscard]] bool settle();
 
-    void begin_instant() noexcept
-    {
-        level_ = 0;
-        ++instant_;
-    }
-
     /// Settles everything that happens at one instant, and evaluates the flow there.
     void settle_all()
     {
-        begin_instant();
+        sets_.begin_instant();
         while (settle()) {
         }
     }
@@ -582,9 +569,6 @@ protected:
     /// Fires the guards that were carried across their surfaces, at the start of a run together
     /// with a time event that is due there.
     [[nodiscard]] bool apply_next_set(bool on_time = false);
-
-    /// Whether set, mode and state repeat those of an earlier level of this instant.
-    [[nodiscard]] bool repeats_level(std::span<const std::size_t> fired);
 
     /// The guard that shows the sets at this instant to be without an end: the set, mode and state
     /// repeat, or it fires for the thousandth time; `no_guard` if there is none.
@@ -654,147 +638,31 @@ protected:
 
     // --- what a rest holds ---
 
-    /// A guard that has come to rest.
-    struct Rested {
-        std::size_t guard = 0;
-        double tolerance = 0;  ///< |g| where it fired last
-        double ahead = 0;      ///< [s] from there to the limit, for which the state stood still
-    };
-
-    /// Components that stand still since the rest of a guard on whose surface the flow presses.
-    struct Hold {
-        std::size_t guard = 0;
-        double inward = 1;    ///< sign of the guard inside
-        double rounding = 0;  ///< of its value there
-        double level = 0;     ///< |g| up to which it is on its surface
-        double ahead = 0;     ///< [s] over which the flow without the hold is followed; 0: never
-        boost::container::small_vector<std::size_t, 8> components{};
-    };
-
-    using Holds = boost::container::small_vector<Hold, 2>;
-
-    /// A short part of a motion that is followed for the sake of a guard.
-    struct Following {
-        std::size_t guard;
-        double t;  ///< [s]
-        const X* x;
-        double ahead;  ///< [s]
-        bool frozen;   ///< the flow is that at t
-    };
-
-    /// Change of a guard along `flow(t, x, dxdt)`, by Heun's step.
-    template <class Flow>
-    [[nodiscard]] double drift(const Following& by, const Flow& flow);
-    /// The same along the flow in which nothing is held.
-    [[nodiscard]] double free_drift(const Following& by);
-
-    /// Whether the flow presses on a guard that has come to rest: it is on its surface, and its
-    /// first derivative that is not zero points outward. Fills in `hold`, but not its components.
-    [[nodiscard]] bool presses(const Rested& rested, Hold& hold);
-
-    /// Holds what the rests of this instant have to hold. The run ends where that is not possible.
-    void hold_rested();
-
-    /// Holds again what rests of the run before this one have held: of guards on their surfaces
-    /// whose `rest` leaves the state and the mode as they are.
-    void hold_again();
-    [[nodiscard]] bool is_at_rest(std::size_t i);
-
-    /// Lets the components that are not held catch up with the limit of the events.
-    void carry_on(double ahead);
-
-    /// Finds the components that `rest` sets to a value that depends neither on the state, by two
-    /// displacements of all of them, nor on the time. False: there are none, or one of them is set
-    /// to a value that moves with the time.
-    [[nodiscard]] bool finds_components(Hold& hold);
-
-    /// Whether the guard stays on its surface for the length of a step while components are held.
-    [[nodiscard]] bool stays_held(const Hold& hold);
-
-    /// Makes the step hold the components of all holds.
-    void renew_holds();
-    /// As `renew_holds`, after the holds have been put back together with the guards, which need
-    /// not be enabled again.
-    void resume_holds()
+    /// The time [s] over which a motion at rest is reviewed: to the next time event or the end, or
+    /// over a million steps.
+    [[nodiscard]] double span_of_rest() const noexcept
     {
-        const std::uint8_t changed = changed_holds_;
-        rested_.clear();
-        renew_holds();
-        changed_holds_ = changed;
+        const double end = timed_ ? std::min(step_.until(time_event()), step_.until(options_.t_end))
+                                  : step_.until(options_.t_end);
+        return std::isfinite(end) && !endless_ && !step_.is_of_host() ? end : 1e6 * h_next_;
     }
+    /// Guards are power series where the method gives them as such, and nothing is held.
+    void heed_holds() noexcept { on_series_ = may_be_on_series_ && step_.has_guard_series(); }
     void forget_holds()
     {
-        resting_ = false;
-        rested_.clear();
-        if (holds_.empty()) return;
-        holds_.clear();
-        renew_holds();
+        holds_.forget();
+        heed_holds();
     }
 
-    [[nodiscard]] bool is_held(std::size_t i) const noexcept
-    {
-        return std::any_of(holds_.begin(), holds_.end(),
-                           [i](const Hold& hold) { return hold.guard == i; });
-    }
-
-    /// Lets the components of hold k move again. The accumulation of events at its guard is then
-    /// counted from the beginning.
-    void release(std::size_t k);
-    /// Releases the holds of components that a reset has changed, or all holds where the mode has
-    /// changed.
-    void release_changed(const X& before, const X& after, bool changes_mode);
     /// Releases, with an event, the first hold whose guard the flow lifts at the start of the step.
     /// False: there is none.
     [[nodiscard]] bool release_lifted();
     void release_here(std::size_t k);
-
-    /// Positive where the flow lifts the guard of a hold from its surface.
-    [[nodiscard]] double lift(const Hold& hold, double t, const X& x);
-
-    /// Where a function rises above zero first; infinity: nowhere.
-    struct Rise {
-        double at = infinity;  ///< [s]
-        double bend = 0;       ///< deviation from a straight line, as a part of its size
-    };
-    /// Where the flow first lifts the guard of a hold from its surface.
-    struct Release {
-        std::size_t hold = no_guard;  ///< number of the hold; `no_guard`: nothing is lifted
-        double at = 0;                ///< [s] offset
-        double bend = 0;              ///< as in `Rise`
-    };
-    /// @param state_at  called as state_at(s, x), writes the state at offset s into x
-    template <class StateAt>
-    [[nodiscard]] Release first_release(double length, const StateAt& state_at);
-    /// Divides [0, length] until a straight line through the ends of a part says where a function,
-    /// not positive at 0, is negative: to a 4096th of the length, and in at most 256 parts.
-    template <class Value>
-    [[nodiscard]] Rise first_rise(const Value& value, double length);
-    /// The end of the bracket of a root, to rounding, at which the function is positive.
-    template <class Value>
-    [[nodiscard]] double narrow(const Value& value, double lo, double hi);
-
-    /// The guard of a hold that has left its surface; `no_guard`: none has.
-    [[nodiscard]] std::size_t guard_left_at(double t, const X& x);
-
-    /// Whether nothing moves and nothing will, up to the next time event or the end: all rates are
-    /// zero, and the flow without holds and all guards have at four later times the values that
-    /// they have now. (For a host, whose end is not known, only the guards are evaluated, over a
-    /// million steps.)
-    [[nodiscard]] bool stands_still();
-    [[nodiscard]] bool guards_stand_still(double t);
-
-    /// Whether holds that have been read are those of a state of n components.
-    [[nodiscard]] bool holds_fit(std::size_t n) const noexcept
+    void release_changed(const X& before, const X& after, bool changes_mode)
     {
-        return std::all_of(holds_.begin(), holds_.end(), [&](const Hold& hold) {
-            return hold.guard < guards_.size() &&
-                   std::all_of(hold.components.begin(), hold.components.end(),
-                               [n](std::size_t component) { return component < n; });
-        });
+        holds_.release_changed(before, after, changes_mode);
+        heed_holds();
     }
-    /// Saves or reads the holds.
-    template <class Visitor>
-    void visit_holds(Visitor&& visit);
 
     /// Arms every guard after a rest, with what it holds.
     void arm_after_rest();
@@ -1056,27 +924,15 @@ protected:
     double last_h_ = 0;        ///< [s] the previous step, or the scale at which guards were armed
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
     bool watching_ = false;    ///< rates are sampled too, since every step is checked
-    double time_event_ = std::numeric_limits<double>::infinity();
     bool time_event_due_ = false;
-    bool change_due_ = false;  ///< the step ends at a change that its stepper has located
-    bool on_change_ = false;   ///< the current set lies there
-    double passed_ = std::numeric_limits<double>::quiet_NaN();  ///< the last time event
+    bool change_due_ = false;           ///< the step ends at a change that its stepper has located
+    bool on_change_ = false;            ///< the current set lies there
     bool cuts_before_windows_ = false;  ///< steps may end before a window, to hold all of it
     double before_window_ = 0;          ///< [s] where the current step should; 0: it stands
-    bool due_here_ = false;             ///< a time event is due at the start of the step
-    bool timer_idles_ = false;          ///< the last time event of this instant changed nothing
-    double listed_at_ = stale;          ///< [s] where time events that are listed were counted,
-    std::size_t listed_left_ = 0;       ///< and how many of them are still to come
-    std::uint64_t timer_instant_ = 0;   ///< the last at which a timer was due, and how often then
-    std::uint32_t timer_at_once_ = 0;
+    TimeEvents<X> time_events_;
+    TimesAtInstant timer_;  ///< of a timer in the state
     bool ended_ = false;
     bool endless_ = false;  ///< the end of the options is infinite
-    bool resting_ = false;  ///< something is held, and nothing moves
-    Holds holds_;
-    boost::container::small_vector<Rested, 2> rested_;  ///< at this instant
-    /// Number of times that all guards are still to be enabled and disabled afresh since the holds
-    /// have changed: once, and once more, after which no guard counts as newly enabled.
-    std::uint8_t changed_holds_ = 0;
     bool stops_ = false;
     std::size_t stopper_ = no_guard;  ///< the guard of the set that ends the run
     bool asked_ = false;              ///< the network has been asked about the current step
@@ -1108,10 +964,9 @@ protected:
     Pending pending_ = Pending::nothing;
     std::size_t stuck_ = no_guard;
     double set_remainder_ = 0;
-    std::uint64_t level_ = 0;    ///< number of sets so far at this instant
-    std::uint64_t instant_ = 0;  ///< number of instants so far
-    Cascade<X> cascade_;
+    EndlessSets<X> sets_;
     Run<X> run_;
+    HeldComponents<X, single> holds_;
     std::string_view who_ = "integrate";  ///< name with which messages of refusal begin
 };
 

@@ -20,7 +20,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::apply(bool located, bool on_time)
 {
     const Instant at = located ? Instant{set_time_, set_remainder_} : step_.instant(0, 0);
-    const double t = on_time ? time_event_ : at.value;
+    const double t = on_time ? time_event() : at.value;
     located_ = located;
     on_time_ = on_time;
     mode_before_ = step_.mode();
@@ -39,13 +39,16 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
     enters_mode_ = shown(resets_.mode()) != shown(step_.mode());
     if (system_->next_time_event_at) {
         const bool changes = changed_mode_ || !same_state(resets_.after(), search_.before());
-        timer_idles_ = !changes && (on_time || (timer_idles_ && !located));
+        time_events_.see_set(changes, on_time, located);
     }
     leaves_phase_ = true;
     if (!holds_.empty()) release_changed(search_.before(), resets_.after(), changed_mode_);
     step_.restart(at, resets_.after(), resets_.mode());
     for (const auto& [component, lost] : left_alone_) step_.set_remainder(component, lost);
-    if (on_time) step_.hold(passed_ = t);
+    if (on_time) {
+        time_events_.pass(t);
+        step_.hold(t);
+    }
     start_beyond_time_event();
     if (stops_) return end(Outcome::stopped_by_event, stopper_);
     pending_ = Pending::settle;
@@ -127,55 +130,19 @@ template <class X, bool single>
 inline void EventEngine<X, single>::find_time_event(After what)
 {
     const double t = step_.start().value;
-    due_here_ = false;
-    if (backward_) {
-        if (system_->previous_time_event) {
-            time_event_ = system_->previous_time_event(system_.adapter(), t);
-        }
-    } else if (system_->next_time_event_at) {
-        time_event_ = system_->next_time_event_at(system_.adapter(), step_.mode(), t, step_.x0());
-    } else {
-        time_event_ = system_->next_time_event(system_.adapter(), t);
-    }
-    if (is_due_here(what)) {
-        due_here_ = true;
-        time_event_ = t;
-        return;
-    }
-    if (step_.until(time_event_) > 0) return;
+    if (time_events_.find(what, step_, resolution_.window(t))) return;
     if (what == After::start || what == After::restart) {
-        throw_time_event_not_ahead(who_, backward_, system_->next_time_event_at, t, time_event_);
+        throw_time_event_not_ahead(who_, backward_, system_->next_time_event_at, t, time_event());
     }
     end(Outcome::time_event_not_ahead);
-}
-
-template <class X, bool single>
-inline bool EventEngine<X, single>::is_due_here(After what)
-{
-    const double t = step_.start().value;
-    if (system_->time_event_count) {
-        if (listed_at_ != t) {
-            listed_at_ = t;
-            const bool is_past =
-                what == After::restart || (what == After::start && options_.continues);
-            listed_left_ = is_past ? 0 : system_->time_event_count(system_.adapter(), t);
-        }
-        if (what == After::time_event && listed_left_ > 0) --listed_left_;
-        return listed_left_ > 0;
-    }
-    // A timer that has had its event has been moved on, also by an earlier run: if it is at t, or
-    // within the window before t, its event is still due.
-    if (backward_ || !system_->next_time_event_at || timer_idles_) return false;
-    const double ahead = step_.until(time_event_);
-    return time_event_ == t || (ahead <= 0 && -ahead <= resolution_.window(t));
 }
 
 template <class X, bool single>
 inline bool EventEngine<X, single>::apply_due_time_event()
 {
     if (system_->time_event_count) {  // each entry of a list happens, whatever it changes
-        begin_instant();
-    } else if (timer_is_endless()) {
+        sets_.begin_instant();
+    } else if (sets_.exceeds(timer_) || sets_.repeats(step_.x0(), step_.mode(), {})) {
         end(Outcome::endless_cascade);
         return false;
     }
@@ -184,13 +151,6 @@ inline bool EventEngine<X, single>::apply_due_time_event()
     place_set(step_.instant(0, 0));
     apply_at_start(true);
     return !ended_;
-}
-
-template <class X, bool single>
-inline bool EventEngine<X, single>::timer_is_endless()
-{
-    timer_at_once_ = std::exchange(timer_instant_, instant_) == instant_ ? timer_at_once_ + 1 : 1;
-    return timer_at_once_ == tolerances::events_at_instant || repeats_level({});
 }
 
 template <class X, bool single>

@@ -19,7 +19,7 @@ inline void EventEngine<X, single>::note_crossings(double s)
 template <class X, bool single>
 inline void EventEngine<X, single>::note_set()
 {
-    const double t = on_time_ ? time_event_ : time_of_set();
+    const double t = on_time_ ? time_event() : time_of_set();
     mode_before_ = step_.mode();
     keep_suspects();
     note_crossings_to_set();
@@ -66,7 +66,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::note_vetoes()
 {
     if (!system_->enabled_at) return;
-    const double t = time_event_;
+    const double t = time_event();
     for (std::size_t i = 0; i < guards_.size(); ++i) {
         const GuardRecord& record = std::as_const(guards_)[i];
         if (!record.acting || !record.enabled || record.info.boolean) continue;

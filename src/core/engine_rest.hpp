@@ -41,8 +41,8 @@ inline bool EventEngine<X, single>::rest_fired()
 template <class X, bool single>
 bool EventEngine<X, single>::comes_from_afar(std::size_t i)
 {
-    const bool on_time = timed_ && passed_ == step_.start().value;
-    if (located_ || !guards_.keeps_armed() || (level_ <= 1 && !on_time)) return false;
+    const bool on_time = timed_ && time_events_.was_at(step_.start().value);
+    if (located_ || !guards_.keeps_armed() || (sets_.level() <= 1 && !on_time)) return false;
     if (std::as_const(guards_)[i].excursions.has_fallen()) return false;
     return std::fabs(guards_.armed_value(i)) > tolerances::of_fading * rounding_of(i);
 }
@@ -109,7 +109,7 @@ bool EventEngine<X, single>::falls(std::size_t i, bool soon)
 template <class X, bool single>
 void EventEngine<X, single>::note_excursions()
 {
-    const Instant at = on_time_ ? Instant{time_event_, 0} : Instant{set_time_, set_remainder_};
+    const Instant at = on_time_ ? Instant{time_event(), 0} : Instant{set_time_, set_remainder_};
     if (!guards_.row().would_follow_soon(at)) return;
     const X& x = search_.before();
     const double interval = guards_.row().interval_to(at);
@@ -262,7 +262,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     const X before = step_.x0();
     const Mode mode = step_.mode();
     ahead = std::min(ahead, step_.until(options_.t_end));
-    if (timed_) ahead = std::min(ahead, step_.until(time_event_));
+    if (timed_) ahead = std::min(ahead, step_.until(time_event()));
     // The rest of the state stands still while the time jumps to the limit of the events: a moving
     // floor would separate from the other bodies, or pass through them.
     if (guards_.size() > 1 && ahead > tolerances::of_time * std::fabs(step_.start().value)) {
@@ -302,7 +302,38 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     guards_[i].intervals.come_to_rest();
     guards_.row().clear();
     const double tolerance = std::exchange(guards_[i].tolerance, 0);
-    if (!enters_mode_) rested_.push_back({i, tolerance, ahead});
+    if (!enters_mode_) holds_.add({i, tolerance, ahead});
+}
+
+template <class X, bool single>
+bool EventEngine<X, single>::release_lifted()
+{
+    const std::size_t k = holds_.lifted();
+    if (k != no_guard) release_here(k);
+    return k != no_guard;
+}
+
+template <class X, bool single>
+void EventEngine<X, single>::release_here(std::size_t k)
+{
+    const double t = step_.time(0);
+    ++run_.statistics.events;
+    record({.t = t,
+            .kind = EventKind::mode,
+            .guard = holds_.guard(k),
+            .mode_before = step_.mode(),
+            .mode_after = step_.mode(),
+            .before = step_.x0(),
+            .after = step_.x0(),
+            .bracket = {t, t},
+            .slope = 0});
+    guards_.take_tolerances();
+    holds_.release(k);
+    heed_holds();
+    leaves_phase_ = changed_mode_ = enters_mode_ = false;
+    if (!step_.is_of_host()) step_.refresh();
+    search_.fired().clear();
+    pending_ = Pending::arm_released;
 }
 
 }  // namespace ricochet::detail

@@ -39,18 +39,22 @@ inline bool EventEngine<X, single>::settle()
     }
     if (ended_) return false;
     if (pending_ != Pending::nothing) return true;
-    if (!search_.fired().empty()) return apply_next_set(due_here_ && at_start);
+    const bool is_due = time_events_.is_due_here();
+    if (!search_.fired().empty()) return apply_next_set(is_due && at_start);
     if (!holds_.empty() && release_lifted()) return true;
-    if (due_here_) return apply_due_time_event();
-    resting_ = !holds_.empty() && stands_still();
+    if (is_due) return apply_due_time_event();
+    if (!holds_.empty()) holds_.review(span_of_rest());
     return false;
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::arm_after_rest()
 {
-    hold_rested();
-    if (!ended_) arm_all();
+    if (ended_) return;
+    const std::size_t loose = holds_.hold_rested(h_next_);
+    heed_holds();
+    if (loose != no_guard) return end(Outcome::zeno, loose);
+    arm_all();
 }
 
 template <class X, bool single>
@@ -90,26 +94,9 @@ inline std::size_t EventEngine<X, single>::endless_guard()
 {
     const std::span<const std::size_t> fired = search_.fired().span();
     for (const std::size_t i : fired) {
-        GuardRecord& record = guards_[i];
-        record.times_at_instant =
-            std::exchange(record.instant, instant_) == instant_ ? record.times_at_instant + 1 : 1;
-        if (record.times_at_instant == tolerances::events_at_instant) return i;
+        if (sets_.exceeds(guards_[i].here)) return i;
     }
-    return repeats_level(fired) ? fired[0] : no_guard;
-}
-
-template <class X, bool single>
-inline bool EventEngine<X, single>::repeats_level(std::span<const std::size_t> fired)
-{
-    // Finds a loop of any length: a set is compared with the last one whose number is a power of
-    // two.
-    if (level_ > 0 && cascade_.is(step_.x0(), step_.mode(), fired)) return true;
-    if (std::has_single_bit(++level_)) {
-        cascade_.x = step_.x0();
-        cascade_.mode = step_.mode();
-        cascade_.fired.assign(fired.begin(), fired.end());
-    }
-    return false;
+    return sets_.repeats(step_.x0(), step_.mode(), fired) ? fired[0] : no_guard;
 }
 
 template <class X, bool single>
@@ -126,7 +113,12 @@ template <class X, bool single>
 inline void EventEngine<X, single>::arm_at_start(bool begins)
 {
     enters_mode_ = false;
-    if (!begins) hold_again();
+    if (!begins) {
+        holds_.hold_again(h_next_, [this](std::size_t i) {
+            return !is_of_phases(i) && resets_any_ && std::as_const(guards_)[i].info.resets;
+        });
+        heed_holds();
+    }
     enable_guards();
     newly_armed_ = true;
     watching_ = false;
@@ -237,7 +229,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::enable_guards()
 {
     for (std::size_t i = 0; i < guards_.size(); ++i) {
-        const bool enabled = system_.enabled_in(i, step_.mode()) && !is_held(i);
+        const bool enabled = system_.enabled_in(i, step_.mode()) && !holds_.is_held(i);
         const GuardRecord& now = std::as_const(guards_)[i];
         const bool enters = enters_mode_ && now.info.at_entry;
         if (enabled == now.enabled && !now.newly_enabled && !enters) continue;
@@ -247,7 +239,7 @@ inline void EventEngine<X, single>::enable_guards()
         record.enabled = enabled;
     }
     guards_.heed_enabled();
-    if (changed_holds_ > 0) --changed_holds_;
+    holds_.see_enabled();
 }
 
 template <class X, bool single>
@@ -261,7 +253,7 @@ inline void EventEngine<X, single>::arm_all()
         widest = std::max(widest, guards_[i].tolerance);
     }
     search_.fired().clear();
-    if (system_->moded || changed_holds_ > 0) enable_guards();
+    if (system_->moded || holds_.has_changed()) enable_guards();
     guards_.await_none();
     newly_armed_ = true;
     watching_ = false;
@@ -517,32 +509,6 @@ inline double EventEngine<X, single>::rate_ahead(std::size_t i, double ahead, do
     }
     return guards_.view(i, step_.mode(), calls())
         .rate(step_.inside(step_.time(ahead)), later, rate_later, scale);
-}
-
-template <class X, bool single>
-inline double EventEngine<X, single>::rounding_of(std::size_t i)
-{
-    return rounding_of(i, step_.mode(), step_.time(0), step_.x0());
-}
-
-template <class X, bool single>
-inline double EventEngine<X, single>::rounding_of(std::size_t i, Mode mode, double t, const X& x)
-{
-    constexpr double nudge = tolerances::of_state;
-    const auto guard = guards_.view(i, mode, calls());
-    const double g = guard.value(t, x);
-    double beside = t * (1 + nudge);
-    if (step_.inside(beside) != beside) beside = step_.inside(t * (1 - nudge));
-    double rounding = std::fabs(guard.value(beside, x) - g);
-    X near = x;
-    for_each_component(near, [&](auto c) {
-        const double kept = near[c];
-        if (kept == 0) return;
-        near[c] = kept * (1 + nudge);
-        rounding += std::fabs(guard.value(t, near) - g);
-        near[c] = kept;
-    });
-    return rounding;
 }
 
 template <class X, bool single>

@@ -75,6 +75,12 @@ struct NotedAtSet {
     bool vetoed = false;   ///< `enabled` rejects an event here
 };
 
+/// How often something has happened at the last instant at which it did.
+struct TimesAtInstant {
+    std::uint64_t instant = 0;
+    std::uint32_t times = 0;
+};
+
 /// State of a guard besides its values.
 struct GuardRecord {
     GuardInfo info;
@@ -106,8 +112,7 @@ struct GuardRecord {
     bool returned = false;  ///< it has come back to that side from the other one
     ShrinkingIntervals intervals;
     Excursions excursions;
-    std::uint64_t instant = 0;           ///< the last at which it fired at the start of a step
-    std::uint32_t times_at_instant = 0;  ///< how often it did so then
+    TimesAtInstant here;  ///< events at the start of a step
     /// The arming of all guards by which its last event has been recorded.
     std::uint64_t recorded_in = std::numeric_limits<std::uint64_t>::max();
     bool armed_beyond = false;  ///< where it was armed at the start, or by a mode

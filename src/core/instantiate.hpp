@@ -7,7 +7,6 @@
 
 #include "core/engine_apply.hpp"
 #include "core/engine_find.hpp"
-#include "core/engine_hold.hpp"
 #include "core/engine_record.hpp"
 #include "core/engine_rest.hpp"
 #include "core/engine_settle.hpp"

@@ -219,7 +219,6 @@ private:
     using Engine::calls;
     using Engine::change_due_;
     using Engine::defers_;
-    using Engine::due_here_;
     using Engine::end;
     using Engine::ended_;
     using Engine::endless_;
@@ -240,14 +239,14 @@ private:
     using Engine::phases_;
     using Engine::planner_;
     using Engine::resolution_;
-    using Engine::resting_;
     using Engine::run_;
     using Engine::search_;
     using Engine::setup_;
     using Engine::step_;
     using Engine::system_;
-    using Engine::time_event_;
+    using Engine::time_event;
     using Engine::time_event_due_;
+    using Engine::time_events_;
     using Engine::timed_;
     using Engine::watching_;
 
@@ -329,8 +328,8 @@ private:
         StepStart<X> start{};
         GuardTable<X, single> guards;
         double flight_start = 0, longest_step = 0, last_h = 0, time_event = 0;
-        bool resting = false, watching = false;
-        typename Engine::Holds holds{};
+        bool watching = false;
+        typename HeldComponents<X, single>::Kept holds{};
     };
 
     /// Finds the deadlines of guards again after an exception has left them half renewed.
@@ -426,7 +425,7 @@ private:
             static_cast<double>(pace_steps()) / (1e2 * static_cast<double>(options_.max_steps));
         const auto is_due = [&](const Review& review) { return counts.steps >= review.due; };
         const bool many_sets = is_due(set_review_) && !is_due(stall_review_) &&
-                               this->instant_ - set_review_.instants >= instants_to_stall();
+                               this->sets_.instants() - set_review_.instants >= instants_to_stall();
         return (is_due(stall_review_) && advances_less(stall_review_, 1e-9)) ||
                (many_sets && advances_less(set_review_, 1e-9)) ||
                (is_due(pace_review_) && counts.events == pace_review_.events &&
@@ -536,7 +535,7 @@ private:
     /// there.
     [[nodiscard]] bool jumps_at_end()
     {
-        return time_event_due_ && step_.sees_jump_at_end(time_event_);
+        return time_event_due_ && step_.sees_jump_at_end(time_event());
     }
 
     /// Repeats an attempt with the given `error`, shorter, until one is accepted; the next step is

@@ -37,7 +37,7 @@ bool Loop<X, single>::search(bool cleared)
         found = find(false);
     }
     if (!found) return ended_;
-    const double t = on_time_ ? time_event_ : this->time_of_set();
+    const double t = on_time_ ? time_event() : this->time_of_set();
     record_step_to_set(search_.at(), t);
     limit_next_step(t);
     this->cut_short();
@@ -58,7 +58,7 @@ template <class X, bool single>
 inline void Loop<X, single>::show_before_resets()
 {
     if (options_.record_steps) static_cast<void>(step_.dense());
-    const double t = before_rounding(on_time_ ? time_event_ : this->time_of_set());
+    const double t = before_rounding(on_time_ ? time_event() : this->time_of_set());
     if (next_sample_ == options_.sample_times.size()) return;
     if (!lies_before(options_.sample_times[next_sample_], t)) return;
     search_.keep_lost(step_);

@@ -32,7 +32,7 @@ template <class X, bool single>
 bool Loop<X, single>::starts_at_set() const noexcept
 {
     const double t = step_.start().value;
-    return (guarded_ && guards_.armed_at() == t) || (timed_ && this->passed_ == t);
+    return (guarded_ && guards_.armed_at() == t) || (timed_ && time_events_.was_at(t));
 }
 
 template <class X, bool single>

@@ -69,7 +69,8 @@ void Loop<X, single>::add_reaction(double t, const X& x, double offset)
 template <class X, bool single>
 void Loop<X, single>::continue_from(const X& x, Mode mode, double h)
 {
-    ended_ = resting_ = this->stops_ = false;
+    ended_ = this->stops_ = false;
+    holds_.wake();
     run_.outcome = Outcome::reached_end;
     this->forget_cause();
     search_.fired().clear();

@@ -14,9 +14,10 @@ inline bool Loop<X, single>::run_quietly()
 template <class X, bool single>
 inline QuietRun Loop<X, single>::quiet_orders() const
 {
-    const bool time_event_first = timed_ && step_.until(time_event_) <= step_.until(options_.t_end);
+    const bool time_event_first =
+        timed_ && step_.until(time_event()) <= step_.until(options_.t_end);
     QuietRun quiet{
-        .end = time_event_first ? time_event_ : options_.t_end,
+        .end = time_event_first ? time_event() : options_.t_end,
         .rtol = options_.rtol,
         .atol = options_.atol,
         .h_min = options_.h_min,

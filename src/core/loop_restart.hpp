@@ -61,7 +61,6 @@ void Loop<X, single>::start_at(double t, const X& x, Mode mode)
         planner_->steps().clear();
         planner_->forget_wrong();
     }
-    this->passed_ = std::numeric_limits<double>::quiet_NaN();
     change_due_ = on_change_ = false;
     if (phases_) {
         X start = x;
@@ -82,8 +81,7 @@ void Loop<X, single>::start_at(double t, const X& x, Mode mode)
     longest_step_ = 0;
     careful_steps_ = 0;
     next_review_ = 0;
-    due_here_ = this->timer_idles_ = false;
-    this->listed_at_ = Engine::stale;
+    time_events_.forget();
     if (timed_) this->find_time_event(Engine::After::restart);
     guards_.forget();
     if (guarded_) {

@@ -82,9 +82,8 @@ void Loop<X, single>::copy_to_mark()
     mark_->flight_start = flight_start_;
     mark_->longest_step = longest_step_;
     mark_->last_h = last_h_;
-    mark_->time_event = time_event_;
-    mark_->resting = resting_;
-    mark_->holds = holds_;
+    mark_->time_event = time_event();
+    mark_->holds = holds_.keep();
     mark_->watching = watching_;
     mark_->everything = true;
 }
@@ -113,10 +112,9 @@ void Loop<X, single>::put_back_everything(const Mark& mark)
     flight_start_ = mark.flight_start;
     longest_step_ = mark.longest_step;
     last_h_ = mark.last_h;
-    time_event_ = mark.time_event;
-    resting_ = mark.resting;
-    holds_ = mark.holds;
-    this->resume_holds();
+    time_events_.put_back(mark.time_event);
+    holds_.put_back(mark.holds);
+    this->heed_holds();
     watching_ = mark.watching;
 }
 
@@ -175,8 +173,8 @@ void Loop<X, single>::go_back_to_mark()
     this->forget_cause();
     ended_ = false;
     pending_ = Engine::Pending::nothing;
-    due_here_ = change_due_ = on_change_ = false;
-    this->listed_at_ = Engine::stale;
+    change_due_ = on_change_ = false;
+    time_events_.forget_here();
     if (guarded_) {
         search_.fired().clear();
         search_.begin(step_.x0());

@@ -43,11 +43,12 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
 template <class X, bool single>
 inline void Loop<X, single>::go_on_from_place()
 {
-    this->resume_holds();
+    holds_.resume();
+    this->heed_holds();
     step_.restart(place_);
     next_review_ = 0;
-    watching_ = replans_ = due_here_ = change_due_ = on_change_ = false;
-    this->listed_at_ = Engine::stale;
+    watching_ = replans_ = change_due_ = on_change_ = false;
+    time_events_.forget_here();
     if (guarded_) search_.begin(step_.x0());
     if (defers_) planner_->restore(guards_);
 }
@@ -65,9 +66,9 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
     visit(first_step_);
     visit(flight_start_);
     visit(longest_step_);
-    visit(time_event_);
+    time_events_.visit(visit);
     if (timed_) visit(place_.is_beyond);
-    this->visit_holds(visit);
+    holds_.visit(visit);
     visit(ended_);
     visit(run_.outcome);
     visit_cause(visit);

@@ -68,10 +68,10 @@ inline void Loop<X, single>::refuse_bad_place() const
     require(first_step_ > 0 && std::isfinite(first_step_), "the first step");
     require(std::isfinite(flight_start_) && longest_step_ >= 0 && std::isfinite(longest_step_),
             "the last event");
-    require(ended_ || lies_before(place_.t.value, time_event_) || !timed_, "the next time event");
+    require(ended_ || lies_before(place_.t.value, time_event()) || !timed_, "the next time event");
     const std::size_t modes = this->modes();
     require(modes == 0 || place_.mode < modes, "the mode");
-    require(this->holds_fit(components), "what a rest holds");
+    require(holds_.fit(components), "what a rest holds");
     const auto is_guard = [this](std::size_t i) { return i == no_guard || i < guards_.size(); };
     require(is_guard(run_.guard) &&
                 (is_guard(run_.other_guard) || run_.other_guard == time_event_reset) &&

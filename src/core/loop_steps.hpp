@@ -95,8 +95,8 @@ inline void Loop<X, single>::advance_from_here(const Advance& how)
 {
     const double remaining = step_.until(options_.t_end);
     // When the time has reached the end, only a time event can still be due.
-    const bool arrived =
-        step_.start().value == options_.t_end && !(timed_ && step_.until(time_event_) <= remaining);
+    const bool arrived = step_.start().value == options_.t_end &&
+                         !(timed_ && step_.until(time_event()) <= remaining);
     if (arrived || !(remaining > 0)) return reach_end();
     if (run_.statistics.steps >= next_review_ && !may_take_more_steps()) return;
     if (options_.cancelled && options_.cancelled->load(std::memory_order_relaxed)) {
@@ -138,14 +138,14 @@ void Loop<X, single>::renew(Review& review, std::uint64_t stride, bool is_first)
     review = {.due = fits ? counts.steps + stride : options_.max_steps,
               .steps = counts.steps,
               .events = counts.events,
-              .instants = this->instant_,
+              .instants = this->sets_.instants(),
               .t = step_.start().value};
 }
 
 template <class X, bool single>
 inline void Loop<X, single>::reach_end()
 {
-    if (defers_ && !newly_armed_ && !resting_) {
+    if (defers_ && !newly_armed_ && !holds_.rests()) {
         planner_->check_last(step_, guards_, run_.statistics);
         if (planner_->wrong()) return this->name_wrong_bound();
     }
@@ -162,7 +162,7 @@ inline void Loop<X, single>::accept()
     if (is_last_) {
         step_.accept_at(options_.t_end);
     } else if (time_event_due_) {
-        step_.accept_at(time_event_);
+        step_.accept_at(time_event());
     } else {
         step_.accept();
     }
@@ -177,7 +177,7 @@ inline bool Loop<X, single>::take_step(double remaining)
     double longest = remaining;
     time_event_due_ = false;
     if (timed_) {
-        const double ahead = step_.until(time_event_);
+        const double ahead = step_.until(time_event());
         if (ahead <= remaining) {
             longest = ahead;
             // A remainder of a millionth of a step is rounding, not a step.
@@ -188,7 +188,7 @@ inline bool Loop<X, single>::take_step(double remaining)
     is_last_ = to_the_end && longest == remaining;
     const double h = to_the_end ? longest : wanted;
     step_.pin(to_the_end ? h : std::numeric_limits<double>::quiet_NaN(),
-              is_last_ ? options_.t_end : time_event_);
+              is_last_ ? options_.t_end : time_event());
     const bool taken = error_controlled_ ? take_controlled_step(h, h_next_) : take_fixed_step(h);
     note_change();
     return taken;
@@ -319,7 +319,7 @@ inline bool Loop<X, single>::happen_where_flow_ends(double h)
 template <class X, bool single>
 void Loop<X, single>::advance_held(double remaining)
 {
-    if (resting_) return hold(remaining);
+    if (holds_.rests()) return hold(remaining);
     if (defers_) this->watch_all();  // bounds hold for the flow, not for what a rest leaves of it
     mark_everything();
     if (!take_step(remaining) || !shorten_to_release()) return;
@@ -331,7 +331,7 @@ template <class X, bool single>
 bool Loop<X, single>::shorten_to_release()
 {
     const double h = step_.h();
-    const auto release = this->first_release(h, [&](double s, X& x) {
+    const auto release = holds_.first_release(h, [&](double s, X& x) {
         s == 0 ? assign(x, step_.x0()) : s == h ? assign(x, step_.x1()) : step_.interpolate(s, x);
     });
     release_at_ = infinity;
@@ -343,7 +343,7 @@ bool Loop<X, single>::shorten_to_release()
         h_next_ = std::min(h_next_, h * factor);
     }
     if (release.hold == no_guard) {
-        const std::size_t left = this->guard_left_at(step_.time(h), step_.x1());
+        const std::size_t left = holds_.guard_left_at(step_.time(h), step_.x1());
         if (left != no_guard) end(Outcome::zeno, left);
         return !ended_;
     }
@@ -381,8 +381,8 @@ inline void Loop<X, single>::hold(double remaining)
     double until = options_.t_end;
     time_event_due_ = false;
     if (timed_) {
-        time_event_due_ = step_.until(time_event_) <= remaining;
-        if (time_event_due_) until = time_event_;
+        time_event_due_ = step_.until(time_event()) <= remaining;
+        if (time_event_due_) until = time_event();
     }
     emit_held_samples(time_event_due_ ? before_rounding(until) : until);
     if (options_.record_steps) record_place(step_.until(until));

@@ -79,14 +79,13 @@ public:
         run_.outcome = Outcome::reached_end;
         this->forget_cause();
         this->pending_ = Pending::nothing;
-        this->begin_instant();
+        this->sets_.begin_instant();
         search_.fired().clear();
         if (defers_) planner_->forget_wrong();
         step_.restart(t, x, mode);
         place_rate(dxdt);
         h_next_ = scale;
-        this->due_here_ = this->timer_idles_ = false;
-        this->listed_at_ = Engine::stale;
+        time_events_.forget();
         if (timed_) this->find_time_event(Engine::After::start);
         guards_.forget();
         if (guarded_) this->arm_at_start(!options_.continues);
@@ -130,12 +129,13 @@ public:
 
     Verdict hold(double t) override
     {
-        if (!resting_ || ended_) throw_out_of_turn("hold", "it after a verdict `rests` alone");
+        if (!holds_.rests() || ended_)
+            throw_out_of_turn("hold", "it after a verdict `rests` alone");
         if (!lies_before(step_.start().value, t) || !std::isfinite(t)) {
             throw_hold_not_ahead(step_.start().value, t);
         }
-        const bool due = timed_ && !lies_before(t, time_event_);
-        if (due && t != time_event_) throw_beyond_time_event(time_event_, t);
+        const bool due = timed_ && !lies_before(t, time_event());
+        if (due && t != time_event()) throw_beyond_time_event(time_event(), t);
         return or_start_anew([&] { return hold_until(t, due); });
     }
 
@@ -143,7 +143,7 @@ public:
     [[nodiscard]] Instant t() const noexcept override { return step_.start(); }
     [[nodiscard]] const X& x() const noexcept override { return step_.x0(); }
     [[nodiscard]] Mode mode() const noexcept override { return step_.mode(); }
-    [[nodiscard]] double must_stop_at() const noexcept override { return time_event_; }
+    [[nodiscard]] double must_stop_at() const noexcept override { return time_event(); }
     [[nodiscard]] std::span<const std::size_t> held() const noexcept override
     {
         return step_.held();
@@ -151,7 +151,7 @@ public:
     [[nodiscard]] double quiet_until() const noexcept override
     {
         if (!guarded_) return backward_ ? -Engine::infinity : Engine::infinity;
-        const bool planned = defers_ && started_ && !ended_ && !resting_ && !newly_armed_ &&
+        const bool planned = defers_ && started_ && !ended_ && !holds_.rests() && !newly_armed_ &&
                              this->pending_ == Pending::nothing;
         return planned ? clock(planner_->limit()) : step_.start().value;
     }
@@ -161,8 +161,8 @@ public:
         require_turn("skip_to");
         if (clock(t.value) < clock(step_.start().value)) throw_gap(step_.start().value, t.value);
         if (!(clock(t.value) <= clock(quiet_until()))) throw_not_quiet(quiet_until(), t.value);
-        if (timed_ && !lies_before(t.value, time_event_)) {
-            throw_beyond_time_event(time_event_, t.value);
+        if (timed_ && !lies_before(t.value, time_event())) {
+            throw_beyond_time_event(time_event(), t.value);
         }
         require_finite(t, x);
         if (quiet_until() == step_.start().value && !same_state(x, step_.x0())) {
@@ -212,10 +212,11 @@ public:
             started_ = had_started;
             throw;
         }
-        this->resume_holds();
+        holds_.resume();
+        this->heed_holds();
         step_.restart(place_);
-        this->watching_ = this->due_here_ = false;
-        this->listed_at_ = Engine::stale;
+        this->watching_ = false;
+        time_events_.forget_here();
         this->forget_cause();
         this->pending_ = Pending::nothing;
         started_ = true;
@@ -231,16 +232,17 @@ private:
     using Engine::guarded_;
     using Engine::guards_;
     using Engine::h_next_;
+    using Engine::holds_;
     using Engine::newly_armed_;
     using Engine::options_;
     using Engine::planner_;
-    using Engine::resting_;
     using Engine::run_;
     using Engine::search_;
     using Engine::step_;
     using Engine::system_;
-    using Engine::time_event_;
+    using Engine::time_event;
     using Engine::time_event_due_;
+    using Engine::time_events_;
     using Engine::timed_;
 
     // --- calls out of turn ---
@@ -250,7 +252,8 @@ private:
         if (!started_) throw_out_of_turn(call, "`start` before it");
         if (this->pending_ != Pending::nothing) throw_out_of_turn(call, "`resume` after a cut");
         if (ended_) throw_out_of_turn(call, "`start` after the end of a run");
-        if (resting_ && call == "examine") throw_out_of_turn(call, "`hold` where the motion rests");
+        if (holds_.rests() && call == "examine")
+            throw_out_of_turn(call, "`hold` where the motion rests");
     }
 
     static void require_length(std::string_view what, double length)
@@ -291,9 +294,9 @@ private:
     {
         const Instant start = step.start();
         const double end = start.after(backward_ ? -step.h : step.h).value;
-        const double ahead = backward_ ? -start.until(time_event_) : start.until(time_event_);
+        const double ahead = backward_ ? -start.until(time_event()) : start.until(time_event());
         const double rounding = tolerances::of_state * std::fabs(end) + 1e-12 * step.h;
-        if (ahead < step.h - rounding) throw_beyond_time_event(time_event_, end);
+        if (ahead < step.h - rounding) throw_beyond_time_event(time_event(), end);
         return ahead <= step.h + rounding;
     }
 
@@ -323,7 +326,7 @@ private:
     [[nodiscard]] Verdict check_at(const HostStepTable& step)
     {
         show(step);
-        if (!this->holds_.empty()) return check_held(step);
+        if (!holds_.empty()) return check_held(step);
         return check_shown(step);
     }
 
@@ -332,19 +335,19 @@ private:
         step_.show(step);
         if (std::exchange(departs_, false)) step_.align_start();
         h_next_ = step.h;
-        this->begin_instant();
+        this->sets_.begin_instant();
     }
 
     /// Examines a step in which components are held, no farther than to where they are released.
     [[nodiscard]] Verdict check_held(const HostStepTable& step)
     {
-        const auto release = this->first_release(step.h, [this, &step](double s, X& x) {
+        const auto release = holds_.first_release(step.h, [this, &step](double s, X& x) {
             if (s == step.h) return assign(x, step_.x1());
             s == 0 ? assign(x, step_.x0()) : step_.interpolate(s, x);
         });
         const bool released = release.hold != no_guard && (release.at < step.h || !time_event_due_);
         if (!released) {
-            const std::size_t left = this->guard_left_at(step_.time(step.h), step_.x1());
+            const std::size_t left = holds_.guard_left_at(step_.time(step.h), step_.x1());
             if (left != no_guard) {
                 this->end(Outcome::zeno, left);
                 step_.restart(step_.start(), step_.x0(), step_.mode());
@@ -389,7 +392,7 @@ private:
         this->last_h_ = step.h;
         if (!time_event_due_) return Verdict::stands;
         cut_.s = step.h;
-        step_.hold(time_event_);
+        step_.hold(time_event());
         this->apply_time_event(step.h);
         return show_set();
     }
@@ -398,7 +401,7 @@ private:
     [[nodiscard]] bool holds_set()
     {
         // Bounds are those of the flow, and not of what a rest leaves of it.
-        const bool plans = defers_ && this->holds_.empty() && !planner_->steps_aside();
+        const bool plans = defers_ && holds_.empty() && !planner_->steps_aside();
         if (plans) return holds_set_by_plan();
         if (defers_) this->watch_all();
         bool cleared = false;
@@ -448,21 +451,21 @@ private:
         cut_.s = 0;
         const double length = step_.until(t);
         const auto kept = [this](double, X& x) { assign(x, step_.x0()); };
-        const auto release = this->first_release(length, kept);
+        const auto release = holds_.first_release(length, kept);
         if (release.hold != no_guard && (release.at < length || !due)) {
             step_.hold(release.at < length ? step_.time(release.at) : t);
-            this->begin_instant();
+            this->sets_.begin_instant();
             this->release_here(release.hold);
             return show_set();
         }
-        const std::size_t left = this->guard_left_at(t, step_.x0());
+        const std::size_t left = holds_.guard_left_at(t, step_.x0());
         if (left != no_guard) {
             this->end(Outcome::zeno, left);
             return Verdict::ended;
         }
         step_.hold(t);
         if (!due) return Verdict::rests;
-        this->begin_instant();
+        this->sets_.begin_instant();
         step_.refresh();
         this->apply_time_event();
         return show_set();
@@ -485,8 +488,8 @@ private:
         cut_.mode_before = step_.mode();
         if (!this->settle()) {
             if (ended_) return Verdict::ended;
-            if (resting_) return Verdict::rests;
-            const bool plans = defers_ && this->holds_.empty() && !planner_->steps_aside();
+            if (holds_.rests()) return Verdict::rests;
+            const bool plans = defers_ && holds_.empty() && !planner_->steps_aside();
             if (plans) this->begin_plan();
             return Verdict::stands;
         }
@@ -539,11 +542,11 @@ private:
                 "the number of components");
         require(std::isfinite(place_.t.value) && std::isfinite(place_.t.remainder), "the time");
         require(all_finite(place_.x) && all_finite(place_.remainder), "the state");
-        require(!timed_ || lies_before(place_.t.value, time_event_), "the next time event");
+        require(!timed_ || lies_before(place_.t.value, time_event()), "the next time event");
         require(h_next_ > 0 && std::isfinite(h_next_), "the scale");
         const std::size_t modes = this->modes();
         require(modes == 0 || place_.mode < modes, "the mode");
-        require(this->holds_fit(place_.x.size()), "what a rest holds");
+        require(holds_.fit(place_.x.size()), "what a rest holds");
     }
 
     template <class Visitor>
@@ -555,8 +558,8 @@ private:
         visit(place_.mode);
         for (X* x : {&place_.x, &place_.remainder, &place_.rate}) visit.state(*x);
         visit(h_next_);
-        visit(time_event_);
-        this->visit_holds(visit);
+        time_events_.visit(visit);
+        holds_.visit(visit);
         visit(departs_);
         visit(ended_);
         visit(run_.outcome);
