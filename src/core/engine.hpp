@@ -42,6 +42,13 @@
 
 namespace ricochet::detail {
 
+/// How a loop uses the engine.
+struct EngineUse {
+    std::string_view who;        ///< name with which messages of refusal begin
+    bool repeats_steps = false;  ///< steps may end before a window, to hold all of it
+    bool cuts_at_all = false;    ///< guards without a reset cut the step, too
+};
+
 /// Converts to `false` as a compile-time constant.
 struct Never {
     constexpr explicit Never(bool) noexcept {}
@@ -50,12 +57,13 @@ struct Never {
 
 template <class X, bool single>
 class EventEngine {
-protected:
+public:
     static constexpr double infinity = std::numeric_limits<double>::infinity();
 
     /// Places the current step at the start. Keeps a reference to `setup`.
     /// @param options  options that have been validated
-    EventEngine(const RunBindings<X>& setup, const X& x0, const Options& options)
+    EventEngine(const RunBindings<X>& setup, const X& x0, const Options& options,
+                const EngineUse& use)
         : setup_(setup),
           span_(span_of(setup, options)),
           system_(*setup.system, setup.adapter, &span_),
@@ -71,6 +79,8 @@ protected:
           options_(options),
           meter_(defers_ ? nullptr : setup.detector.metering),
           resolution_(options),
+          cuts_at_all_(use.cuts_at_all),
+          who_(use.who),
           backward_(options.t_end < options.t_start),
           step_(system_, *setup.kernel, x0, options),
           guards_(system_, GuardRules::of(setup.detector, system_), backward_),
@@ -85,21 +95,55 @@ protected:
         const Screening screening = setup.detector.screening;
         may_be_on_series_ = !defers_ && !predicts_ &&
                             (screening == Screening::extremum || screening == Screening::every);
-        on_series_ = may_be_on_series_ && step_.has_guard_series();
+        cuts_before_windows_ = !single && use.repeats_steps && options.event_window > 0 && !defers_;
         if (defers_) planner_.emplace(system_, finders_, x0, backward_, guards_.size());
     }
 
-    // --- set-up ---
+    // --- the run in progress, on which the loop works, too ---
 
-    /// The times at which functions may be called; a host may go on for ever.
-    [[nodiscard]] static RunSpan<X> span_of(const RunBindings<X>& setup, const Options& options)
+    [[nodiscard]] Step<X>& step() noexcept { return step_; }
+    [[nodiscard]] const Step<X>& step() const noexcept { return step_; }
+    [[nodiscard]] Run<X>& run() noexcept { return run_; }
+    [[nodiscard]] const Run<X>& run() const noexcept { return run_; }
+    [[nodiscard]] Options& options() noexcept { return options_; }
+    [[nodiscard]] const Options& options() const noexcept { return options_; }
+    [[nodiscard]] const SystemAt<X>& system() const noexcept { return system_; }
+    [[nodiscard]] const Finders<X>& finders() const noexcept { return finders_; }
+    [[nodiscard]] const EventResolution& resolution() const noexcept { return resolution_; }
+    [[nodiscard]] const GuardTable<X, single>& guards() const noexcept { return guards_; }
+    [[nodiscard]] HeldComponents<X, single>& holds() noexcept { return holds_; }
+    [[nodiscard]] const HeldComponents<X, single>& holds() const noexcept { return holds_; }
+    [[nodiscard]] Planner<X, single>& planner() noexcept { return *planner_; }
+    [[nodiscard]] const Planner<X, single>& planner() const noexcept { return *planner_; }
+    [[nodiscard]] const MeterOfRun& meter() const noexcept
     {
-        if (!setup.kernel->take) return {};
-        return {.from = std::min(options.t_start, options.t_end),
-                .to = std::max(options.t_start, options.t_end)};
+        return defers_ ? planner_->meter() : meter_;
     }
+    /// Approximate length [s] of the next step.
+    [[nodiscard]] double& h_next() noexcept { return h_next_; }
+    [[nodiscard]] double h_next() const noexcept { return h_next_; }
+    /// Length [s] of the previous step, or the scale at which guards were armed.
+    [[nodiscard]] double& last_h() noexcept { return last_h_; }
 
-    // --- phases ---
+    /// What the current step ends at.
+    struct End {
+        bool time_event = false;
+        bool change = false;  ///< that its stepper has located
+    };
+    [[nodiscard]] End& ends_at() noexcept { return ends_at_; }
+    [[nodiscard]] const End& ends_at() const noexcept { return ends_at_; }
+
+    /// All guards are sampled at the start of the step, none is planned.
+    [[nodiscard]] bool newly_armed() const noexcept { return newly_armed_; }
+    /// Rates are sampled, too, since every step is checked.
+    [[nodiscard]] bool watching() const noexcept { return watching_; }
+    [[nodiscard]] bool ended() const noexcept { return ended_; }
+    /// Number of instants with events so far.
+    [[nodiscard]] std::uint64_t instants() const noexcept { return sets_.instants(); }
+    [[nodiscard]] bool is_after_time_event() const noexcept
+    {
+        return timed_ && time_events_.was_at(step_.start().value);
+    }
 
     /// Whether guard i belongs to the phases, not to the system.
     [[nodiscard]] bool is_of_phases(std::size_t i) const noexcept
@@ -108,25 +152,6 @@ protected:
     }
     /// The mode of the system.
     [[nodiscard]] Mode shown(Mode mode) const noexcept { return phases_ ? own_mode(mode) : mode; }
-
-    /// Lets the phases decide how the motion goes on after the resets of a set.
-    [[gnu::noinline]] void decide(bool on_time, double t)
-    {
-        if (resets_.conflict().first != no_guard || shown(resets_.mode()) >= own_modes - 1) return;
-        const PhaseSet<X> set{search_.fired().span(),
-                              on_time,
-                              std::exchange(on_change_, false),
-                              t,
-                              step_.mode(),
-                              resets_.mode(),
-                              search_.before()};
-        resets_.move_to(phases_->decide(phases_->adapter, set, resets_.after()));
-    }
-
-    /// Records the changes of reactions at a set that no guard of the system stands for.
-    [[gnu::noinline]] void record_changes(double t, bool located);
-    /// The change of a reaction that is recorded under a guard of the system, or null.
-    [[nodiscard, gnu::noinline]] const ReactionChange* change_under(std::size_t guard);
 
     /// Number of modes; 0: not declared. A system without modes is always in mode 0.
     [[nodiscard]] std::size_t modes() const { return system_->moded ? system_.modes() : 1; }
@@ -142,25 +167,6 @@ protected:
     /// Whether something besides the end time and the resets may end the run; of resets that is not
     /// known in advance.
     [[nodiscard]] bool may_end() const noexcept;
-
-    /// Puts the guards that fire at the start into the fired set; if the run `begins` there, also
-    /// those with `at_start`.
-    void arm_at_start(bool begins);
-
-    /// Whether guard i, not in the fired set, is on its other side at the set by no more than
-    /// rounding.
-    [[nodiscard]] bool is_flipped_by_rounding(std::size_t i, Side before);
-
-    /// Change of guard i at the start of the step that may come from rounding of the time and of
-    /// the state, by 8 units in the last place of each component.
-    [[nodiscard]] double rounding_of(std::size_t i)
-    {
-        return rounding_of(i, step_.mode(), step_.time(0), step_.x0());
-    }
-    [[nodiscard]] double rounding_of(std::size_t i, Mode mode, double t, const X& x)
-    {
-        return detail::rounding_of(guards_.view(i, mode, calls()), step_, t, x);
-    }
 
     /// Time [s] of the next time event; infinity: there is none.
     [[nodiscard]] double time_event() const noexcept { return time_events_.next(); }
@@ -192,19 +198,18 @@ protected:
         run_.reason.clear();
     }
 
-    void add_evidence(Evidence evidence, std::uint64_t steps) noexcept;
-
-    /// Brings the statistics up to date with what the step, the search and the planner have
-    /// counted.
-    void collect_counts() noexcept
+    /// Lets the run go on that has ended.
+    void reopen() noexcept
     {
-        run_.statistics.flow_calls = step_.flow_calls();
-        run_.statistics.resteps = step_.resteps();
-        if (defers_) planner_->add_counts(run_.statistics);
-        run_.statistics.disabled += std::exchange(search_.disabled, 0);
+        ended_ = false;
+        run_.outcome = Outcome::reached_end;
     }
 
-    // --- time events ---
+    // --- set-up ---
+
+    /// Puts the guards that fire at the start into the fired set; if the run `begins` there, also
+    /// those with `at_start`.
+    void arm_at_start(bool begins);
 
     using After = typename TimeEvents<X>::After;
 
@@ -212,41 +217,23 @@ protected:
     /// refused.
     void find_time_event(After what);
 
-    /// Asks a timer in the state, which a set or a rest may have started or cancelled.
-    void ask_timer()
+    /// Forgets the events of a run, before another one starts.
+    void forget_run();
+    /// Name with which messages of refusal begin.
+    void speak_as(std::string_view who) noexcept { who_ = who; }
+    /// Moves the end of the run to t_end [s]; infinity: it is endless, and its options end at the
+    /// largest double.
+    void end_at(double t_end)
     {
-        if (system_->next_time_event_at && !ended_) find_time_event(After::set);
+        endless_ = std::isinf(t_end);
+        if (endless_) t_end = std::copysign(std::numeric_limits<double>::max(), t_end);
+        options_.t_end = t_end;
+        (backward_ ? span_.from : span_.to) = t_end;
+        step_.renew_span();
     }
+    [[nodiscard]] bool is_endless() const noexcept { return endless_; }
 
-    /// Applies a time event that is due at the start of the step, after others of this instant.
-    [[nodiscard]] bool apply_due_time_event();
-
-    /// Applies a set without guards at the start of the step: a time event, or a change that the
-    /// stepper has located. `settle` deals with its consequences.
-    /// @param taken  as in `leave_from_start`
-    void apply_without_guards(bool on_time, double taken = 0)
-    {
-        begin_set();
-        apply_at_start(on_time, taken);
-    }
-    /// Begins the first set of an instant.
-    void begin_set() noexcept
-    {
-        guards_.take_tolerances();
-        first_set_ = true;
-    }
-    /// Applies a time event, or a change located by the stepper, after other sets of the same
-    /// instant: guards keep their event tolerances.
-    void apply_at_start(bool on_time, double taken = 0);
-    void apply_time_event(double taken = 0) { apply_without_guards(true, taken); }
-
-    /// After a time event the flow is that of the double after it, where it jumps there.
-    void start_beyond_time_event()
-    {
-        if (timed_ && time_events_.was_at(step_.start().value)) step_.start_beyond(options_.t_end);
-    }
-
-    // --- finding ---
+    // --- find ---
 
     /// Lets the detector examine the step as it does every step. False: it holds no event.
     /// @param cleared  whether a network has predicted that it holds none
@@ -271,11 +258,365 @@ protected:
     /// Guards with power series need no rates until a search asks for them.
     void sample_end()
     {
-        if (!on_series_) return guards_.sample_end(step_, calls());
+        if (!on_series()) return guards_.sample_end(step_, calls());
         guards_.sample_values_at_end(step_, calls());
         guards_.see_series(step_);
         if (!guards_.on_series()) guards_.complete_rates(step_, calls());
     }
+
+    [[nodiscard]] Evidence evidence_of_quiet() const noexcept
+    {
+        return on_series() ? Evidence::proved : finders_.detector.evidence;
+    }
+
+    void pass_on_clear() noexcept
+    {
+        run_.statistics.evidence.add(evidence_of_clear());
+        guards_.pass_on();
+    }
+
+    /// Whether the end of the step is a time that is known before: that of a time event, or the end
+    /// of the run.
+    [[nodiscard]] bool ends_on_time() const noexcept
+    {
+        return ends_at_.time_event || step_.is_pinned();
+    }
+    /// Finds the first set that cuts the step short, and the state after its resets. False:
+    /// the step stands, and the other events in it are recorded.
+    /// @param before_resets  called before the resets of a set, which may change the flow
+    template <class Before>
+    [[nodiscard]] bool find(bool cleared, const Before& before_resets);
+    [[nodiscard]] bool find(bool cleared)
+    {
+        return find(cleared, [] {});
+    }
+
+    /// Whether the step is to end before the window of a set, which the next one holds as a whole,
+    /// and [s] where; 0: it stands.
+    [[nodiscard]] double take_before_window() noexcept { return std::exchange(before_window_, 0); }
+    [[nodiscard]] bool is_before_window() const noexcept { return before_window_ > 0; }
+
+    /// A guard that acts or records, and the time until it reaches its surface at its present rate.
+    struct Approach {
+        std::size_t guard = no_guard;
+        double ahead = infinity;  ///< [s]
+    };
+    /// The first guard to reach its surface in the direction that counts.
+    [[nodiscard]] Approach first_approach();
+
+    // --- quiet runs ---
+
+    /// Whether guards are power series over each step.
+    [[nodiscard]] bool on_series() const noexcept
+    {
+        return may_be_on_series_ && step_.has_guard_series();
+    }
+    void lend(QuietRun& quiet) const noexcept
+    {
+        quiet.checks_inside = guards_.checks_inside() && options_.check_inside && !on_series();
+        guards_.lend(quiet, step_.time(0));
+    }
+    /// Takes the guard, the counts and the length of the next step over from a quiet run.
+    void take_back(const QuietRun& quiet);
+
+    // --- deferred checks ---
+
+    void name_wrong_bound()
+    {
+        run_.wrong_bound = planner_->wrong();
+        end(Outcome::wrong_bound, run_.wrong_bound->guard);
+    }
+
+    void count_deferred(std::size_t steps) noexcept
+    {
+        run_.statistics.checks_deferred += steps;
+        add_evidence(finders_.detector.deferred, steps);
+    }
+
+    /// Samples all guards at the start of the current step, in which every guard is examined.
+    void watch_all()
+    {
+        if (!watching_) guards_.wake_all(step_, last_h_, calls(), newly_armed_);
+        watching_ = newly_armed_ = true;
+        planner_->review(run_.statistics);
+    }
+
+    /// Plans the deadlines of guards that have just been armed.
+    void begin_plan()
+    {
+        newly_armed_ = watching_ = false;
+        planner_->begin(step_, guards_);
+    }
+
+    /// Whether one of the guards in doubt needs a search in the current step. Those that their
+    /// bounds clear on a division of the step are not in doubt any more.
+    [[nodiscard]] bool judges_suspicious();
+
+    /// As `Planner::close`, for the current step.
+    [[nodiscard]] std::size_t close_interval()
+    {
+        return planner_->close(step_, guards_, run_.statistics, h_next_);
+    }
+    /// Tests a deferred guard, or the verified ones, or all at the end of the run; true: a bound is
+    /// wrong, and the run has ended.
+    [[nodiscard]] bool sample_sleeper()
+    {
+        planner_->sample_sleeper(step_, guards_, run_.statistics);
+        return has_wrong_bound();
+    }
+    [[nodiscard]] bool settle_verified()
+    {
+        planner_->settle(step_, guards_, run_.statistics);
+        return has_wrong_bound();
+    }
+    [[nodiscard]] bool check_last()
+    {
+        planner_->check_last(step_, guards_, run_.statistics);
+        return has_wrong_bound();
+    }
+    [[nodiscard]] bool has_wrong_bound()
+    {
+        if (planner_->wrong()) name_wrong_bound();
+        return ended_;
+    }
+    /// Plans again after an exception has left the deadlines half renewed.
+    void plan_again()
+    {
+        guards_.wake_all(step_, last_h_, calls(), newly_armed_);
+        newly_armed_ = true;
+    }
+    void watch_no_more() noexcept { watching_ = false; }
+
+    // --- apply ---
+
+    /// Time [s] of the set that was found, the offset of it, and the state and mode before it.
+    [[nodiscard]] double set_time() const noexcept { return on_time_ ? time_event() : set_time_; }
+    [[nodiscard]] double set_offset() const noexcept { return search_.at(); }
+    [[nodiscard]] const X& before() noexcept { return search_.before(); }
+    [[nodiscard]] Mode mode_before() const noexcept { return mode_before_; }
+    [[nodiscard]] bool is_on_time() const noexcept { return on_time_; }
+    [[nodiscard]] std::span<const std::size_t> fired() noexcept { return search_.fired().span(); }
+    /// Keeps what the samples before the set need of its search.
+    void keep_lost() { search_.keep_lost(step_); }
+
+    /// Applies the set that was found, which cuts the step short.
+    void cut_short();
+
+    /// Applies a set without guards at the start of the step: a time event, or a change that the
+    /// stepper has located. `settle` deals with its consequences.
+    /// @param taken  as in `leave_from_start`
+    void apply_without_guards(bool on_time, double taken = 0)
+    {
+        begin_set();
+        apply_at_start(on_time, taken);
+    }
+    /// Applies a time event at the start of the step.
+    void apply_time_event() { apply_without_guards(true); }
+    /// Applies what the accepted step has ended at. @param taken  as in `leave_from_start`
+    void apply_at_end(double taken)
+    {
+        on_change_ = std::exchange(ends_at_.change, false);
+        apply_without_guards(timed_ && ends_at_.time_event, taken);
+    }
+    /// Keeps the flow at the start of the step that is accepted next.
+    void keep_flow_at_start() { assign(left_start_, step_.rate0()); }
+    /// Fires guard i at the start of the step, or records its event there. False: nothing fires.
+    [[nodiscard]] bool fire_here(std::size_t i);
+    /// Goes on from here in another phase: not a start, so that guards keep their sides. `settle`
+    /// is due.
+    void change_phase(const X& x, Mode mode);
+
+    // --- settle ---
+
+    /// Work that is due once the flow at the start of the step is known.
+    enum class Pending : std::uint8_t {
+        nothing,
+        settle,        ///< guards have fired: handle their accumulations, then arm all guards
+        arm,           ///< a fired guard has come to rest: arm all guards
+        arm_stuck,     ///< the same, for a guard that its reset did not turn back
+        arm_released,  ///< components that a rest held go free: arm all guards
+    };
+
+    /// Arms the guards with the flow at x⁺. True: another set has been applied at the same
+    /// instant, or a fired guard has come to rest, and `settle` is due again.
+    [[nodiscard]] bool settle();
+
+    /// Settles everything that happens at one instant, and evaluates the flow there.
+    void settle_all()
+    {
+        sets_.begin_instant();
+        while (settle()) {
+        }
+    }
+
+    [[nodiscard]] Pending pending() const noexcept { return pending_; }
+    void drop_pending() noexcept { pending_ = Pending::nothing; }
+    void begin_instant() noexcept { sets_.begin_instant(); }
+
+    // --- rest ---
+
+    /// Releases hold k of what is held, with an event, at the start of the step.
+    void release_here(std::size_t k);
+
+    // --- record ---
+
+    /// Whether events are recorded with their states.
+    [[nodiscard]] bool records_states() const noexcept
+    {
+        return options_.record_events && (options_.event_states || system_->fixed_dimension);
+    }
+
+    void add_evidence(Evidence evidence, std::uint64_t steps) noexcept;
+
+    /// Brings the statistics up to date with what the step, the search and the planner have
+    /// counted.
+    void collect_counts() noexcept
+    {
+        run_.statistics.flow_calls = step_.flow_calls();
+        run_.statistics.resteps = step_.resteps();
+        if (defers_) planner_->add_counts(run_.statistics);
+        run_.statistics.disabled += std::exchange(search_.disabled, 0);
+    }
+
+    /// Lists the guards that were armed beyond their surfaces.
+    void list_armed_beyond()
+    {
+        run_.armed_beyond.clear();
+        run_.armed_on_surface.clear();
+        for (std::size_t i = 0; i < std::min(guards_.size(), own_guards_); ++i) {
+            if (std::as_const(guards_)[i].armed_on) note_left_start(i);
+            const GuardRecord& record = std::as_const(guards_)[i];
+            if (!record.armed_beyond) continue;
+            run_.armed_beyond.push_back(i);
+            if (record.armed_on) run_.armed_on_surface.push_back(i);
+        }
+    }
+
+    /// Takes back a recorded event of guard i.
+    void forget_event(std::size_t i) noexcept { --guards_[i].events; }
+
+    // --- snapshots ---
+
+    /// State of the guards on which their future depends.
+    template <class Visitor>
+    void visit_guards(Visitor&& visit)
+    {
+        if (guarded_) guards_.visit(visit);
+    }
+    template <class Visitor>
+    void visit_planner(Visitor&& visit)
+    {
+        if (!defers_) return;
+        visit(last_h_);
+        visit(newly_armed_);
+        planner_->visit(visit);
+    }
+    template <class Visitor>
+    void visit_time_event(Visitor&& visit)
+    {
+        time_events_.visit(visit);
+    }
+    template <class Visitor>
+    void visit_ended(Visitor&& visit)
+    {
+        visit(ended_);
+    }
+    /// Goes on from a place that has been read together with the guards.
+    void go_on_from(const StepStart<X>& place);
+
+    /// What events change, as it is at the start of a step.
+    struct Checkpoint {
+        explicit Checkpoint(const EventEngine& engine) : guards(engine.guards_) {}
+
+        GuardTable<X, single> guards;
+        StepStart<X> start{};
+        double last_h = 0, time_event = 0;
+        bool watching = false;
+        typename HeldComponents<X, single>::Kept holds{};
+    };
+    void keep(Checkpoint& at) const;
+    void put_back(const Checkpoint& at);
+    /// Forgets what was being done where an exception has come from.
+    /// @param newly_armed  as it was at the start of the step
+    void forget_exception(bool newly_armed);
+    /// Events that were rejected in searches, and are not yet counted.
+    [[nodiscard]] std::uint64_t& disabled() noexcept { return search_.disabled; }
+
+private:
+    // --- set-up ---
+
+    /// The times at which functions may be called; a host may go on for ever.
+    [[nodiscard]] static RunSpan<X> span_of(const RunBindings<X>& setup, const Options& options)
+    {
+        if (!setup.kernel->take) return {};
+        return {.from = std::min(options.t_start, options.t_end),
+                .to = std::max(options.t_start, options.t_end)};
+    }
+
+    // --- phases ---
+
+    /// Lets the phases decide how the motion goes on after the resets of a set.
+    [[gnu::noinline]] void decide(bool on_time, double t)
+    {
+        if (resets_.conflict().first != no_guard || shown(resets_.mode()) >= own_modes - 1) return;
+        const PhaseSet<X> set{search_.fired().span(),
+                              on_time,
+                              std::exchange(on_change_, false),
+                              t,
+                              step_.mode(),
+                              resets_.mode(),
+                              search_.before()};
+        resets_.move_to(phases_->decide(phases_->adapter, set, resets_.after()));
+    }
+
+    /// Records the changes of reactions at a set that no guard of the system stands for.
+    [[gnu::noinline]] void record_changes(double t, bool located);
+    /// The change of a reaction that is recorded under a guard of the system, or null.
+    [[nodiscard, gnu::noinline]] const ReactionChange* change_under(std::size_t guard);
+
+    /// Whether guard i, not in the fired set, is on its other side at the set by no more than
+    /// rounding.
+    [[nodiscard]] bool is_flipped_by_rounding(std::size_t i, Side before);
+
+    /// Change of guard i at the start of the step that may come from rounding of the time and of
+    /// the state, by 8 units in the last place of each component.
+    [[nodiscard]] double rounding_of(std::size_t i)
+    {
+        return rounding_of(i, step_.mode(), step_.time(0), step_.x0());
+    }
+    [[nodiscard]] double rounding_of(std::size_t i, Mode mode, double t, const X& x)
+    {
+        return detail::rounding_of(guards_.view(i, mode, calls()), step_, t, x);
+    }
+
+    // --- time events ---
+
+    /// Asks a timer in the state, which a set or a rest may have started or cancelled.
+    void ask_timer()
+    {
+        if (system_->next_time_event_at && !ended_) find_time_event(After::set);
+    }
+
+    /// Applies a time event that is due at the start of the step, after others of this instant.
+    [[nodiscard]] bool apply_due_time_event();
+
+    /// Begins the first set of an instant.
+    void begin_set() noexcept
+    {
+        guards_.take_tolerances();
+        first_set_ = true;
+    }
+    /// Applies a time event, or a change located by the stepper, after other sets of the same
+    /// instant: guards keep their event tolerances.
+    void apply_at_start(bool on_time, double taken = 0);
+
+    /// After a time event the flow is that of the double after it, where it jumps there.
+    void start_beyond_time_event()
+    {
+        if (timed_ && time_events_.was_at(step_.start().value)) step_.start_beyond(options_.t_end);
+    }
+
+    // --- finding ---
 
     void check_inside();
 
@@ -290,25 +631,8 @@ protected:
         return guards_.on_series() ? Evidence::proved : finders_.detector.evidence;
     }
 
-    [[nodiscard]] Evidence evidence_of_quiet() const noexcept
-    {
-        return on_series_ ? Evidence::proved : finders_.detector.evidence;
-    }
-
-    void pass_on_clear() noexcept
-    {
-        run_.statistics.evidence.add(evidence_of_clear());
-        guards_.pass_on();
-    }
-
     // --- ties ---
 
-    /// Whether the end of the step is a time that is known before: that of a time event, or the end
-    /// of the run.
-    [[nodiscard]] bool ends_on_time() const noexcept
-    {
-        return time_event_due_ || step_.is_pinned();
-    }
     /// Whether guard i is so near to its surface at the end of the step that rounding may decide
     /// whether it has crossed.
     [[nodiscard]] bool may_tie(std::size_t i) const noexcept;
@@ -322,16 +646,6 @@ protected:
     [[nodiscard]] bool add_ties(bool found);
     /// Records the crossings of recorded guards that tie with a time event.
     void note_ties();
-
-    /// Finds the first set that cuts the step short, and the state after its resets. False:
-    /// the step stands, and the other events in it are recorded.
-    /// @param before_resets  called before the resets of a set, which may change the flow
-    template <class Before>
-    [[nodiscard]] bool find(bool cleared, const Before& before_resets);
-    [[nodiscard]] bool find(bool cleared)
-    {
-        return find(cleared, [] {});
-    }
 
     /// Whether the window of the set that was found reaches beyond the step, and a step that begins
     /// shortly before the set would hold all of it: `before_window_` is the offset of that place.
@@ -357,6 +671,8 @@ protected:
             if (guards_.leaves_plateau(i)) search_.end_plateau(step_, guards_, i, calls());
         }
     }
+
+    [[nodiscard]] double approach_rate(std::size_t i);
 
     /// Whether an event of guard i, which is about to fire at the start of the step, counts.
     [[nodiscard]] bool counts_here(std::size_t i);
@@ -448,55 +764,15 @@ protected:
     /// Whether this event of the guard, not yet counted, ends the run.
     [[nodiscard]] bool ends_run(std::size_t i) const noexcept;
 
-    /// Whether events are recorded with their states.
-    [[nodiscard]] bool records_states() const noexcept
-    {
-        return options_.record_events && (options_.event_states || system_->fixed_dimension);
-    }
-
     void go_on_past_members();
 
     // --- deferred checks ---
-
-    void name_wrong_bound()
-    {
-        run_.wrong_bound = planner_->wrong();
-        end(Outcome::wrong_bound, run_.wrong_bound->guard);
-    }
-
-    void count_deferred(std::size_t steps) noexcept
-    {
-        run_.statistics.checks_deferred += steps;
-        add_evidence(finders_.detector.deferred, steps);
-    }
-
-    /// Samples all guards at the start of the current step, in which every guard is examined.
-    void watch_all()
-    {
-        if (!watching_) guards_.wake_all(step_, last_h_, calls(), newly_armed_);
-        watching_ = newly_armed_ = true;
-        planner_->review(run_.statistics);
-    }
-
-    /// Plans the deadlines of guards that have just been armed.
-    void begin_plan()
-    {
-        newly_armed_ = watching_ = false;
-        planner_->begin(step_, guards_);
-    }
-
-    /// Whether one of the guards in doubt needs a search in the current step. Those that their
-    /// bounds clear on a division of the step are not in doubt any more.
-    [[nodiscard]] bool judges_suspicious();
 
     /// Whether declared bounds show an event inside the current step, where every guard is
     /// examined.
     [[nodiscard]] bool bounds_show_event();
 
     // --- applying ---
-
-    /// Applies the set that was found, which cuts the step short.
-    void cut_short();
 
     /// Fires the set: places the step at the state after the resets, and records the events. Unless
     /// the run has ended, `settle` is due.
@@ -544,27 +820,6 @@ protected:
     }
 
     // --- settling ---
-
-    /// Work that is due once the flow at the start of the step is known.
-    enum class Pending : std::uint8_t {
-        nothing,
-        settle,        ///< guards have fired: handle their accumulations, then arm all guards
-        arm,           ///< a fired guard has come to rest: arm all guards
-        arm_stuck,     ///< the same, for a guard that its reset did not turn back
-        arm_released,  ///< components that a rest held go free: arm all guards
-    };
-
-    /// Arms the guards with the flow at x⁺. True: another set has been applied at the same
-    /// instant, or a fired guard has come to rest, and `settle` is due again.
-    [[nodiscard]] bool settle();
-
-    /// Settles everything that happens at one instant, and evaluates the flow there.
-    void settle_all()
-    {
-        sets_.begin_instant();
-        while (settle()) {
-        }
-    }
 
     /// Fires the guards that were carried across their surfaces, at the start of a run together
     /// with a time event that is due there.
@@ -646,23 +901,9 @@ protected:
                                   : step_.until(options_.t_end);
         return std::isfinite(end) && !endless_ && !step_.is_of_host() ? end : 1e6 * h_next_;
     }
-    /// Guards are power series where the method gives them as such, and nothing is held.
-    void heed_holds() noexcept { on_series_ = may_be_on_series_ && step_.has_guard_series(); }
-    void forget_holds()
-    {
-        holds_.forget();
-        heed_holds();
-    }
-
     /// Releases, with an event, the first hold whose guard the flow lifts at the start of the step.
     /// False: there is none.
     [[nodiscard]] bool release_lifted();
-    void release_here(std::size_t k);
-    void release_changed(const X& before, const X& after, bool changes_mode)
-    {
-        holds_.release_changed(before, after, changes_mode);
-        heed_holds();
-    }
 
     /// Arms every guard after a rest, with what it holds.
     void arm_after_rest();
@@ -701,20 +942,6 @@ protected:
     /// Removes from the count of guards armed beyond their surfaces those that are not there any
     /// more.
     void forget_armed_beyond();
-
-    /// Lists the guards that were armed beyond their surfaces.
-    void list_armed_beyond()
-    {
-        run_.armed_beyond.clear();
-        run_.armed_on_surface.clear();
-        for (std::size_t i = 0; i < std::min(guards_.size(), own_guards_); ++i) {
-            if (std::as_const(guards_)[i].armed_on) note_left_start(i);
-            const GuardRecord& record = std::as_const(guards_)[i];
-            if (!record.armed_beyond) continue;
-            run_.armed_beyond.push_back(i);
-            if (record.armed_on) run_.armed_on_surface.push_back(i);
-        }
-    }
 
     /// Counts guard i as armed beyond its surface if it stood there at the start, by rounding, and
     /// has left without an event.
@@ -883,15 +1110,6 @@ protected:
     /// Records the events up to offset s that change nothing.
     void record_notes(double s);
 
-    // --- saving ---
-
-    /// State of the guards on which their future depends.
-    template <class Visitor>
-    void visit_guards(Visitor&& visit)
-    {
-        if (guarded_) guards_.visit(visit);
-    }
-
     static constexpr double stale = std::numeric_limits<double>::quiet_NaN();
     /// Fraction of the last flight of a guard over which a difference quotient is taken: over this
     /// length the rounding of its small excursions is magnified less than over the usual 1e-5 of a
@@ -911,10 +1129,11 @@ protected:
     std::conditional_t<single, Never, bool> defers_;  ///< only the loop of any number plans
     bool predicts_;
     bool may_be_on_series_ = false;  ///< where the method gives guards as power series
-    bool on_series_ = false;         ///< guards are power series over each step
     Options options_;
     MeterOfRun meter_;
     EventResolution resolution_;
+    bool cuts_at_all_;
+    std::string_view who_;
     bool backward_;
     Step<X> step_;
     GuardTable<X, single> guards_;
@@ -924,11 +1143,10 @@ protected:
     double last_h_ = 0;        ///< [s] the previous step, or the scale at which guards were armed
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
     bool watching_ = false;    ///< rates are sampled too, since every step is checked
-    bool time_event_due_ = false;
-    bool change_due_ = false;           ///< the step ends at a change that its stepper has located
-    bool on_change_ = false;            ///< the current set lies there
-    bool cuts_before_windows_ = false;  ///< steps may end before a window, to hold all of it
-    double before_window_ = 0;          ///< [s] where the current step should; 0: it stands
+    End ends_at_;
+    bool on_change_ = false;    ///< the current set lies there
+    bool cuts_before_windows_;  ///< `EngineUse::repeats_steps`, and there are windows
+    double before_window_ = 0;  ///< [s] where the current step should; 0: it stands
     TimeEvents<X> time_events_;
     TimesAtInstant timer_;  ///< of a timer in the state
     bool ended_ = false;
@@ -936,7 +1154,6 @@ protected:
     bool stops_ = false;
     std::size_t stopper_ = no_guard;  ///< the guard of the set that ends the run
     bool asked_ = false;              ///< the network has been asked about the current step
-    bool cuts_at_all_ = false;        ///< guards without a reset cut the step, too
     MergedResets<X> resets_;
     /// Time [s] of the current set. Time and remainder are kept apart in memory: a copy of both as
     /// a pair, right after each has been written by itself, would stall the processor.
@@ -967,7 +1184,6 @@ protected:
     EndlessSets<X> sets_;
     Run<X> run_;
     HeldComponents<X, single> holds_;
-    std::string_view who_ = "integrate";  ///< name with which messages of refusal begin
 };
 
 }  // namespace ricochet::detail

@@ -42,7 +42,7 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
         time_events_.see_set(changes, on_time, located);
     }
     leaves_phase_ = true;
-    if (!holds_.empty()) release_changed(search_.before(), resets_.after(), changed_mode_);
+    if (!holds_.empty()) holds_.release_changed(search_.before(), resets_.after(), changed_mode_);
     step_.restart(at, resets_.after(), resets_.mode());
     for (const auto& [component, lost] : left_alone_) step_.set_remainder(component, lost);
     if (on_time) {
@@ -164,6 +164,44 @@ inline void EventEngine<X, single>::apply_at_start(bool on_time, double taken)
     transform(on_time, false);
     note_left_alone(false);
     apply(false, on_time);
+}
+
+template <class X, bool single>
+inline bool EventEngine<X, single>::fire_here(std::size_t i)
+{
+    if (!counts_here(i)) return false;
+    if (!guards_[i].acting) {
+        record_jump(i, guards_[i].side);
+        return false;
+    }
+    begin_set();
+    guards_[i].tolerance = std::fabs(guards_.g0(i));
+    search_.fired().clear();
+    search_.fired().push_back(i);
+    return true;
+}
+
+template <class X, bool single>
+void EventEngine<X, single>::change_phase(const X& x, Mode mode)
+{
+    reopen();
+    stops_ = false;
+    holds_.wake();
+    forget_cause();
+    search_.fired().clear();
+    leave_from_start(0);
+    assign(search_.before(), step_.x0());
+    mode_before_ = step_.mode();
+    changed_mode_ = mode != step_.mode();
+    enters_mode_ = shown(mode) != shown(step_.mode());
+    leaves_phase_ = true;
+    on_time_ = located_ = on_change_ = ends_at_.change = false;
+    const X from = step_.x0(), remainder = step_.remainder();
+    step_.restart(step_.start(), x, mode);
+    for (std::size_t c = 0; c < static_cast<std::size_t>(from.size()); ++c) {
+        if (from[c] == x[c]) step_.set_remainder(c, remainder[c]);
+    }
+    pending_ = Pending::settle;
 }
 
 }  // namespace ricochet::detail

@@ -109,7 +109,7 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
     if (guards_.waiting()) end_plateaus();
     guards_.begin_search(step_.h());
     for (bool may_tie = true;;) {
-        const bool found = search_.find_set(step_, guards_, time_event_due_, calls());
+        const bool found = search_.find_set(step_, guards_, ends_at_.time_event, calls());
         if (!single && cuts_before_windows_ && found && may_tie && ends_inside_window())
             return false;
         const bool tied = may_tie && add_ties(found);
@@ -118,8 +118,8 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
         if (found && predicts_ && (cleared || search_.late())) ++run_.statistics.missed_events;
         if (search_.late()) ++run_.statistics.late_events;
         dismiss_members();
-        on_time_ = time_event_due_ && search_.at() == step_.h();
-        on_change_ = change_due_ && search_.at() == step_.h();
+        on_time_ = ends_at_.time_event && search_.at() == step_.h();
+        on_change_ = ends_at_.change && search_.at() == step_.h();
         if (search_.fired().empty() && !(tied && on_time_)) continue;
         const bool met =
             tied ? search_.meet_conditions_on_time(step_, guards_, calls())
@@ -160,7 +160,7 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
 template <class X, bool single>
 bool EventEngine<X, single>::ends_inside_window()
 {
-    if (ends_on_time() || change_due_) return false;
+    if (ends_on_time() || ends_at_.change) return false;
     const double first = search_.first_root();
     const double t = step_.time(first);
     const double window = resolution_.window(t), before = window / 16;
@@ -265,7 +265,7 @@ inline void EventEngine<X, single>::go_on_past_members()
     for (const std::size_t i : search_.fired()) {
         // A crossing that was joined to the end of the run is left to a run that starts there,
         // whose state lies before it.
-        if (!time_event_due_ && search_.was_joined(step_, i)) continue;
+        if (!ends_at_.time_event && search_.was_joined(step_, i)) continue;
         search_.note(i, guards_[i].side, records_states());
         search_.pass(step_, guards_, i, calls());
     }
@@ -313,6 +313,52 @@ inline bool EventEngine<X, single>::judges_suspicious()
     run_.statistics.evidence.add(finders_.detector.evidence);
     for (const std::size_t i : planner_->judged()) guards_.leave_plateau(i);
     return false;
+}
+
+template <class X, bool single>
+auto EventEngine<X, single>::first_approach() -> Approach
+{
+    Approach first;
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        const GuardRecord& record = guards_[i];
+        if (!record.enabled || record.info.boolean) continue;
+        if (!counts(record.side, record.info.crossing)) continue;
+        const double g = guards_.g0(i);
+        const double rate = approach_rate(i);
+        const double ahead = g * rate < 0 && std::isfinite(rate) ? -g / rate : infinity;
+        if (ahead < first.ahead) first = {i, ahead};
+    }
+    return first;
+}
+
+template <class X, bool single>
+double EventEngine<X, single>::approach_rate(std::size_t i)
+{
+    double rate = guards_.complete_rate0(i, step_, h_next_, calls());
+    if (!system_->rated) {
+        // Over a short step the rounding of the state may swallow the difference.
+        double scale = h_next_;
+        for (int k = 0; rate == 0 && k < 12; ++k) rate = departure(i, scale *= 16);
+    }
+    return rate;
+}
+
+template <class X, bool single>
+inline void EventEngine<X, single>::take_back(const QuietRun& quiet)
+{
+    if (on_series()) {
+        guards_.take_back_on_series(quiet, step_);
+    } else {
+        guards_.take_back(quiet, step_, calls());
+    }
+    h_next_ = error_controlled_ || quiet.why == QuietEnd::due ? quiet.h_next : h_next_;
+    Statistics& counts = run_.statistics;
+    counts.rejected += quiet.rejected;
+    counts.guard_calls += quiet.guard_calls;
+    if (quiet.steps == 0) return;
+    last_h_ = step_.h();
+    counts.steps += quiet.steps;
+    if (guards_.size() > 0) add_evidence(evidence_of_quiet(), quiet.steps);
 }
 
 }  // namespace ricochet::detail

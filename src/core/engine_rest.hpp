@@ -293,7 +293,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     }
     leaves_phase_ = false;
     enters_mode_ = shown(mode_after) != shown(mode);
-    if (!holds_.empty()) release_changed(before, after, enters_mode_);
+    if (!holds_.empty()) holds_.release_changed(before, after, enters_mode_);
     step_.restart(ahead, 0, after, mode_after);
     start_beyond_time_event();
     for (const std::size_t k : search_.fired()) {
@@ -329,7 +329,6 @@ void EventEngine<X, single>::release_here(std::size_t k)
             .slope = 0});
     guards_.take_tolerances();
     holds_.release(k);
-    heed_holds();
     leaves_phase_ = changed_mode_ = enters_mode_ = false;
     if (!step_.is_of_host()) step_.refresh();
     search_.fired().clear();

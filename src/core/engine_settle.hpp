@@ -52,7 +52,6 @@ inline void EventEngine<X, single>::arm_after_rest()
 {
     if (ended_) return;
     const std::size_t loose = holds_.hold_rested(h_next_);
-    heed_holds();
     if (loose != no_guard) return end(Outcome::zeno, loose);
     arm_all();
 }
@@ -117,7 +116,6 @@ inline void EventEngine<X, single>::arm_at_start(bool begins)
         holds_.hold_again(h_next_, [this](std::size_t i) {
             return !is_of_phases(i) && resets_any_ && std::as_const(guards_)[i].info.resets;
         });
-        heed_holds();
     }
     enable_guards();
     newly_armed_ = true;

@@ -11,7 +11,7 @@ inline bool EventEngine<X, single>::may_tie(std::size_t i) const noexcept
 {
     const GuardRecord& record = guards_[i];
     if (!record.enabled || record.deferred || record.info.boolean) return false;
-    if (!record.acting && !time_event_due_) return false;
+    if (!record.acting && !ends_at_.time_event) return false;
     if (!counts(record.side, record.info.crossing)) return false;
     return std::fabs(guards_.g1(i)) <= tolerances::by_rounding * guards_.scale(i, step_.h());
 }
@@ -71,7 +71,7 @@ bool EventEngine<X, single>::add_ties(bool found)
         const double end = search_.at() + resolution_.window(step_.time(search_.at()));
         at_end = end >= h;
         if (!at_end) {
-            if (!time_event_due_) return false;
+            if (!ends_at_.time_event) return false;
             for (const std::size_t i : search_.fired()) {
                 if (!may_tie(i) || rate_of_tie(i) == 0) return false;
             }

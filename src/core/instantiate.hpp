@@ -9,6 +9,7 @@
 #include "core/engine_find.hpp"
 #include "core/engine_record.hpp"
 #include "core/engine_rest.hpp"
+#include "core/engine_saving.hpp"
 #include "core/engine_settle.hpp"
 #include "core/engine_ties.hpp"
 #include "core/event_notes.hpp"

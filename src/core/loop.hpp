@@ -39,48 +39,53 @@ template <class X>
 [[nodiscard]] QuietKernel<X> quiet_kernel(const RunBindings<X>& setup) noexcept;
 
 template <class X, bool single>
-class Loop : public LendingLoop<X>, private EventEngine<X, single> {
+class Loop : public LendingLoop<X> {
     using Engine = EventEngine<X, single>;
 
 public:
     /// Keeps a reference to `setup`.
-    Loop(const RunBindings<X>& setup, const X& x0, const Options& options)
-        : Engine(setup, x0, checked(setup, options, x0)),
+    Loop(const RunBindings<X>& setup, const X& x0, const Options& given)
+        : setup_(setup),
+          phases_(setup.system->phases),
+          error_controlled_(setup.error_controlled),
+          guarded_(setup.system->guarded),
+          timed_(setup.system->timed()),
+          defers_(defers(setup.detector, *setup.system)),
+          backward_(given.t_end < given.t_start),
+          engine_(setup, x0, checked(setup, given, x0),
+                  {.who = "integrate", .repeats_steps = true}),
           components_(static_cast<std::size_t>(x0.size())),
           quiet_(quiet_kernel(setup))
     {
-        if (std::isinf(options_.t_end)) {
-            endless_ = true;
-            options_.t_end = std::copysign(std::numeric_limits<double>::max(), options_.t_end);
-        }
-        h_next_ = options_.step > 0 ? options_.step : std::fabs(options_.t_end - options_.t_start);
+        if (std::isinf(given.t_end)) engine_.end_at(given.t_end);
+        h_next() =
+            options().step > 0 ? options().step : std::fabs(options().t_end - options().t_start);
         if (error_controlled_) {
-            if (step_.error_order() == 0) throw_no_error_estimate();
-            step_.measure_with(options_.component_atol, options_.atol);
-            if (options_.step == 0) h_next_ = initial_step(step_, options_, h_next_);
-            h_next_ = std::min(h_next_, options_.h_max);
+            if (now().error_order() == 0) throw_no_error_estimate();
+            now().measure_with(options().component_atol, options().atol);
+            if (options().step == 0) h_next() = initial_step(now(), options(), h_next());
+            h_next() = std::min(h_next(), options().h_max);
         }
-        first_step_ = h_next_;
-        this->cuts_before_windows_ = !single && options_.event_window > 0 && !defers_;
-        flight_start_ = options_.t_start;
-        this->refuse_bad_modes();
-        if (!step_.flow_fits()) throw_flow_does_not_fit("integrate", components_);
-        if (guarded_) this->refuse_bad_guards();
-        if (system_->forward_only && backward_) throw_forward_only();
+        first_step_ = h_next();
+        flight_start_ = options().t_start;
+        engine_.refuse_bad_modes();
+        if (!now().flow_fits()) throw_flow_does_not_fit("integrate", components_);
+        if (guarded_) engine_.refuse_bad_guards();
+        if (system()->forward_only && backward_) throw_forward_only();
         if (timed_) {
-            if (backward_ && !system_->previous_time_event) throw_no_previous_time_event();
-            this->find_time_event(Engine::After::start);
+            if (backward_ && !system()->previous_time_event) throw_no_previous_time_event();
+            engine_.find_time_event(Engine::After::start);
         }
         if (setup.detector.check) {
-            const double smallest = error_controlled_ ? options_.h_min : options_.step;
-            const double largest = error_controlled_ ? options_.h_max : options_.step;
+            const double smallest = error_controlled_ ? options().h_min : options().step;
+            const double largest = error_controlled_ ? options().h_max : options().step;
             setup.detector.check(setup.detecting, setup.adapter, x0, smallest, largest);
         }
-        if (guarded_) this->arm_at_start(!options_.continues);
-        if (endless_ && !this->may_end()) throw_endless(options.t_end);
-        if (guarded_ || timed_) this->settle_all();
+        if (guarded_) engine_.arm_at_start(!options().continues);
+        if (engine_.is_endless() && !engine_.may_end()) throw_endless(given.t_end);
+        if (guarded_ || timed_) engine_.settle_all();
         if (phases_) {
-            if (phases_->list_in) phases_->list_in(system_.adapter(), run_.phases);
+            if (phases_->list_in) phases_->list_in(system().adapter(), result().phases);
             review_phase(false);
         }
     }
@@ -88,48 +93,45 @@ public:
     [[nodiscard]] double t() const noexcept override  ///< [s]
     {
         switch (showing_) {
-            case Showing::sample: return run_.trajectory.t[shown_samples_ - 1];
-            case Showing::event: return run_.events[shown_records_ - 1].t;
+            case Showing::sample: return result().trajectory.t[shown_samples_ - 1];
+            case Showing::event: return result().events[shown_records_ - 1].t;
             case Showing::step: break;
         }
-        return step_.start().value;
+        return now().start().value;
     }
     [[nodiscard]] const X& x() const noexcept override
     {
         switch (showing_) {
-            case Showing::sample: return run_.trajectory.x[shown_samples_ - 1];
-            case Showing::event: return run_.events[shown_records_ - 1].after;
+            case Showing::sample: return result().trajectory.x[shown_samples_ - 1];
+            case Showing::event: return result().events[shown_records_ - 1].after;
             case Showing::step: break;
         }
-        return step_.x0();
+        return now().x0();
     }
     [[nodiscard]] Mode mode() const noexcept override
     {
         switch (showing_) {
             case Showing::sample: return sample_mode_;
-            case Showing::event: return run_.events[shown_records_ - 1].mode_after;
+            case Showing::event: return result().events[shown_records_ - 1].mode_after;
             case Showing::step: break;
         }
-        return this->shown(step_.mode());
+        return engine_.shown(now().mode());
     }
     [[nodiscard]] std::vector<double> reaction() const override;
-    [[nodiscard]] bool ended() const noexcept override { return ended_; }
+    [[nodiscard]] bool ended() const noexcept override { return engine_.ended(); }
     /// Result so far; `finish` brings its time and state up to date.
-    [[nodiscard]] const Run<X>& run() const noexcept override { return run_; }
+    [[nodiscard]] const Run<X>& run() const noexcept override { return engine_.run(); }
 
     /// Cost and savings of the network of a `Metered` detector so far.
-    [[nodiscard]] MeterReading meter() const override
-    {
-        return defers_ ? planner_->meter().reading() : meter_.reading();
-    }
+    [[nodiscard]] MeterReading meter() const override { return engine_.meter().reading(); }
 
     /// Takes one step, with any events that it holds. False: the run has ended. A detector
     /// that defers checks does not look ahead here, since every step is final.
     bool step() override
     {
         show_all();
-        if (!ended_) advance_one({.look_ahead = false});
-        return !ended_;
+        if (!ended()) advance_one({.look_ahead = false});
+        return !ended();
     }
 
     /// Advances to the next sample time or event, which is shown once, with all others at its
@@ -147,9 +149,9 @@ public:
     /// Makes `advance` show only samples and events from here on.
     void show_all() noexcept override
     {
-        shown_samples_ = run_.trajectory.t.size();
-        shown_records_ = run_.events.size();
-        shown_events_ = run_.statistics.events;
+        shown_samples_ = result().trajectory.t.size();
+        shown_records_ = result().events.size();
+        shown_events_ = result().statistics.events;
         showing_ = Showing::step;
     }
 
@@ -158,8 +160,8 @@ public:
     // --- quiet steps that are taken elsewhere ---
 
     bool go_to_quiet_steps(QuietRun& quiet, bool beyond) override;
-    void take_back(const QuietRun& quiet) override { take_over(quiet); }
-    [[nodiscard]] StepState<X>& lend() noexcept override { return step_.lend(); }
+    void take_back(const QuietRun& quiet) override { engine_.take_back(quiet); }
+    [[nodiscard]] StepState<X>& lend() noexcept override { return now().lend(); }
 
     /// Advances to the end and returns the result.
     [[nodiscard]] Run<X> take() override
@@ -186,10 +188,7 @@ public:
     /// Lets a run that was cancelled continue.
     void go_on() noexcept override
     {
-        if (ended_ && run_.outcome == Outcome::cancelled) {
-            ended_ = false;
-            run_.outcome = Outcome::reached_end;
-        }
+        if (ended() && result().outcome == Outcome::cancelled) engine_.reopen();
     }
 
     /// State on which the future of the run depends. A simulation of the same system with the same
@@ -209,46 +208,28 @@ protected:
     /// Keeps the start of every step from here on, so that the run can continue after exceptions.
     void keep_resumable()
     {
-        mark_ = std::make_unique<Mark>(guards_);
-        step_.store(mark_->start);
+        mark_ = std::make_unique<Mark>(engine_);
+        now().store(mark_->at.start);
     }
 
 private:
-    using Engine::asked_;
-    using Engine::backward_;
-    using Engine::calls;
-    using Engine::change_due_;
-    using Engine::defers_;
-    using Engine::end;
-    using Engine::ended_;
-    using Engine::endless_;
-    using Engine::error_controlled_;
-    using Engine::finders_;
-    using Engine::guarded_;
-    using Engine::guards_;
-    using Engine::h_next_;
-    using Engine::holds_;
-    using Engine::infinity;
-    using Engine::last_h_;
-    using Engine::meter_;
-    using Engine::newly_armed_;
-    using Engine::on_change_;
-    using Engine::on_time_;
-    using Engine::options_;
-    using Engine::pending_;
-    using Engine::phases_;
-    using Engine::planner_;
-    using Engine::resolution_;
-    using Engine::run_;
-    using Engine::search_;
-    using Engine::setup_;
-    using Engine::step_;
-    using Engine::system_;
-    using Engine::time_event;
-    using Engine::time_event_due_;
-    using Engine::time_events_;
-    using Engine::timed_;
-    using Engine::watching_;
+    static constexpr double infinity = std::numeric_limits<double>::infinity();
+
+    /// The current step.
+    [[nodiscard]] Step<X>& now() noexcept { return engine_.step(); }
+    [[nodiscard]] const Step<X>& now() const noexcept { return engine_.step(); }
+    /// The run so far.
+    [[nodiscard]] Run<X>& result() noexcept { return engine_.run(); }
+    [[nodiscard]] const Run<X>& result() const noexcept { return engine_.run(); }
+    [[nodiscard]] const Options& options() const noexcept { return engine_.options(); }
+    [[nodiscard]] const SystemAt<X>& system() const noexcept { return engine_.system(); }
+    [[nodiscard]] Planner<X, single>& planner() noexcept { return engine_.planner(); }
+    [[nodiscard]] const Planner<X, single>& planner() const noexcept { return engine_.planner(); }
+    [[nodiscard]] double& h_next() noexcept { return engine_.h_next(); }
+    [[nodiscard]] double h_next() const noexcept { return engine_.h_next(); }
+    [[nodiscard]] double time_event() const noexcept { return engine_.time_event(); }
+    /// The current step ends neither at a time event nor at the end of the run.
+    void end_early() noexcept { is_last_ = engine_.ends_at().time_event = false; }
 
     // --- set-up ---
 
@@ -274,9 +255,9 @@ private:
     void advance_one(const Advance& how)
     {
         if (mark_) return advance_resumably(how);
-        const std::uint64_t steps = run_.statistics.steps;
+        const std::uint64_t steps = result().statistics.steps;
         advance_from_here(how);
-        if (phases_) review_phase(run_.statistics.steps != steps);
+        if (phases_) review_phase(result().statistics.steps != steps);
     }
     [[gnu::noinline]] void advance_resumably(const Advance& how);
     [[gnu::always_inline]] void advance_from_here(const Advance& how);
@@ -296,7 +277,7 @@ private:
     /// Whether events can be shown at their own times.
     [[nodiscard]] bool shows_events() const noexcept
     {
-        return !setup_.add_event && this->records_states();
+        return !setup_.add_event && engine_.records_states();
     }
 
     // --- interventions ---
@@ -314,7 +295,7 @@ private:
     // --- resumption after an exception ---
 
     struct Mark {
-        explicit Mark(const GuardTable<X, single>& guards_) : guards(guards_) {}
+        explicit Mark(const Engine& engine) : at(engine) {}
 
         double h_next = 0;
         Statistics counts{};
@@ -325,19 +306,15 @@ private:
         bool planned = false;  ///< the guards are left alone until their deadlines
         bool newly_armed = false;
         bool everything = false;  ///< the members below are kept, too
-        StepStart<X> start{};
-        GuardTable<X, single> guards;
-        double flight_start = 0, longest_step = 0, last_h = 0, time_event = 0;
-        bool watching = false;
-        typename HeldComponents<X, single>::Kept holds{};
+        double flight_start = 0, longest_step = 0;
+        typename Engine::Checkpoint at;
     };
 
     /// Finds the deadlines of guards again after an exception has left them half renewed.
     void plan_anew()
     {
         if (!replans_) return;
-        guards_.wake_all(step_, last_h_, calls(), newly_armed_);
-        newly_armed_ = true;
+        engine_.plan_again();
         replans_ = false;
     }
 
@@ -350,7 +327,6 @@ private:
     }
     [[gnu::noinline]] void copy_to_mark();
     void go_back_to_mark();
-    void put_back_everything(const Mark& mark);
     void cut_records(const Mark& mark, std::size_t samples, std::size_t pieces);
     void rewind_counts(const Mark& mark, std::uint64_t steps, std::uint64_t rejected);
 
@@ -358,7 +334,7 @@ private:
     /// to be recorded.
     void mark_what_lasts()
     {
-        if (mark_ && (time_event_due_ || options_.record_steps || holds_sample())) {
+        if (mark_ && (engine_.ends_at().time_event || options().record_steps || holds_sample())) {
             mark_everything();
         }
     }
@@ -367,9 +343,9 @@ private:
 
     [[nodiscard]] bool may_run_quietly() const noexcept
     {
-        return quiet_ && holds_.empty() && step_.start().value != options_.t_end &&
-               run_.statistics.steps < next_review_ && !options_.record_steps &&
-               next_sample_ >= options_.sample_times.size() && guards_.is_steady();
+        return quiet_ && engine_.holds().empty() && now().start().value != options().t_end &&
+               result().statistics.steps < next_review_ && !options().record_steps &&
+               next_sample_ >= options().sample_times.size() && engine_.guards().is_steady();
     }
 
     /// Takes steps until one needs a check, and handles it. False: no step did. After an exception
@@ -380,7 +356,6 @@ private:
     /// Limits and settings for the quiet steps from here on.
     [[nodiscard, gnu::always_inline]] QuietRun quiet_orders() const;
     [[gnu::always_inline]] void run_quietly(QuietRun& quiet);
-    [[gnu::always_inline]] void take_over(const QuietRun& quiet);
     [[gnu::always_inline]] void end_quiet_run(const QuietRun& quiet);
 
     /// Whether the limits of the options allow further steps; also sets when to ask next.
@@ -397,8 +372,8 @@ private:
     [[nodiscard]] std::uint64_t pace_steps() const noexcept
     {
         constexpr std::uint64_t most = 20'000;  // under two seconds where a step takes 80 us
-        const bool limited = options_.max_steps < std::numeric_limits<std::uint64_t>::max();
-        return limited ? std::min(options_.stall_steps, most) : 0;
+        const bool limited = options().max_steps < std::numeric_limits<std::uint64_t>::max();
+        return limited ? std::min(options().stall_steps, most) : 0;
     }
 
     /// Whether the time has hardly advanced since a review that is due, or has, without an event,
@@ -407,25 +382,25 @@ private:
     /// still in this sense, however far the end lies.
     [[nodiscard]] bool stands_still() const noexcept
     {
-        const Statistics& counts = run_.statistics;
-        if (endless_) {
-            const double so_far = std::fabs(step_.until(options_.t_start));
+        const Statistics& counts = result().statistics;
+        if (engine_.is_endless()) {
+            const double so_far = std::fabs(now().until(options().t_start));
             return counts.steps >= stall_review_.due &&
-                   std::fabs(step_.until(stall_review_.t)) < 1e-6 * so_far;
+                   std::fabs(now().until(stall_review_.t)) < 1e-6 * so_far;
         }
-        const double span = std::fabs(options_.t_end - options_.t_start);
-        const double so_far = std::fabs(step_.until(options_.t_start));
+        const double span = std::fabs(options().t_end - options().t_start);
+        const double so_far = std::fabs(now().until(options().t_start));
         const auto advances_less = [&](const Review& since, double part) {
-            const double advance = std::fabs(step_.until(since.t));
+            const double advance = std::fabs(now().until(since.t));
             const auto steps = static_cast<double>(counts.steps - since.steps);
             const bool shrunk = advance < 1e-6 * steps * first_step_;
             return advance < part * span && (shrunk || advance < 1e-6 * so_far);
         };
         const double part =
-            static_cast<double>(pace_steps()) / (1e2 * static_cast<double>(options_.max_steps));
+            static_cast<double>(pace_steps()) / (1e2 * static_cast<double>(options().max_steps));
         const auto is_due = [&](const Review& review) { return counts.steps >= review.due; };
         const bool many_sets = is_due(set_review_) && !is_due(stall_review_) &&
-                               this->sets_.instants() - set_review_.instants >= instants_to_stall();
+                               engine_.instants() - set_review_.instants >= instants_to_stall();
         return (is_due(stall_review_) && advances_less(stall_review_, 1e-9)) ||
                (many_sets && advances_less(set_review_, 1e-9)) ||
                (is_due(pace_review_) && counts.events == pace_review_.events &&
@@ -436,15 +411,15 @@ private:
     /// have to.
     [[nodiscard]] std::uint64_t instants_to_stall() const noexcept
     {
-        return std::max<std::uint64_t>(options_.stall_steps / 10, 1);
+        return std::max<std::uint64_t>(options().stall_steps / 10, 1);
     }
 
     /// Ends the run after a failed step.
     void end_step(Outcome outcome) noexcept
     {
-        if (!step_.flow_fits()) return end(Outcome::wrong_dimension);
-        if (outcome == Outcome::non_finite) return this->end_not_finite("flow", no_guard);
-        end(outcome);
+        if (!now().flow_fits()) return engine_.end(Outcome::wrong_dimension);
+        if (outcome == Outcome::non_finite) return engine_.end_not_finite("flow", no_guard);
+        engine_.end(outcome);
     }
 
     void reach_end();
@@ -452,13 +427,12 @@ private:
     /// Accepts the step, with a time event at its end if one is due.
     void pass()
     {
-        if ((timed_ && time_event_due_) || change_due_) {
+        if ((timed_ && engine_.ends_at().time_event) || engine_.ends_at().change) {
             mark_everything();
-            const double taken = step_.h();
-            assign(this->left_start_, step_.rate0());
+            const double taken = now().h();
+            engine_.keep_flow_at_start();
             accept();
-            on_change_ = std::exchange(change_due_, false);
-            this->apply_without_guards(timed_ && time_event_due_, taken);
+            engine_.apply_at_end(taken);
             return settle_and_record();
         }
         accept();
@@ -468,7 +442,7 @@ private:
 
     // --- steps whose checks may be deferred ---
 
-    [[nodiscard]] bool is_tentative() const noexcept { return defers_ && planner_->in_interval(); }
+    [[nodiscard]] bool is_tentative() const noexcept { return defers_ && planner().in_interval(); }
 
     /// One step with a check of its end, where planning does not pay.
     void advance_with_check(double remaining);
@@ -493,9 +467,9 @@ private:
     /// Rolls the whole interval back without a check, and continues step by step.
     void take_back()
     {
-        const std::size_t accepted = planner_->steps().size();
+        const std::size_t accepted = planner().steps().size();
         careful_steps_ = accepted + 1;
-        planner_->abandon();
+        planner().abandon();
         take_back_to(0, accepted);
     }
 
@@ -505,9 +479,9 @@ private:
 
     [[nodiscard]] bool holds_sample() const noexcept
     {
-        const auto& times = options_.sample_times;
+        const auto& times = options().sample_times;
         return next_sample_ < times.size() &&
-               lies_before(times[next_sample_], step_.time(step_.h()));
+               lies_before(times[next_sample_], now().time(now().h()));
     }
 
     /// Takes a step no longer than `remaining` [s] or the time to the next time event.
@@ -515,7 +489,7 @@ private:
     [[nodiscard]] bool take_step(double remaining);
 
     /// Notes whether the step that has been taken ends at a change that its stepper has located.
-    void note_change() noexcept { change_due_ = phases_ && step_.ends_at_change(); }
+    void note_change() noexcept { engine_.ends_at().change = phases_ && now().ends_at_change(); }
 
     /// Limits the next step to the length that its method allows.
     [[gnu::noinline]] double length_within_reach();
@@ -526,8 +500,8 @@ private:
     /// @param proposed  length of the step if nothing had cut it short
     [[nodiscard]] bool take_controlled_step(double h, double proposed)
     {
-        double error = step_.attempt(h, options_.rtol, options_.atol);
-        if (jumps_at_end()) error = step_.attempt(h, options_.rtol, options_.atol);
+        double error = now().attempt(h, options().rtol, options().atol);
+        if (jumps_at_end()) error = now().attempt(h, options().rtol, options().atol);
         return retry(h, proposed, rule_.largest, error);
     }
 
@@ -535,23 +509,15 @@ private:
     /// there.
     [[nodiscard]] bool jumps_at_end()
     {
-        return time_event_due_ && step_.sees_jump_at_end(time_event());
+        return engine_.ends_at().time_event && now().sees_jump_at_end(time_event());
     }
 
     /// Repeats an attempt with the given `error`, shorter, until one is accepted; the next step is
     /// at most `largest` times as long.
     [[nodiscard]] bool retry(double h, double proposed, double largest, double error);
 
-    /// A guard that acts or records, and the time until it reaches its surface at its present rate.
-    struct Approach {
-        std::size_t guard = no_guard;
-        double ahead = infinity;  ///< [s]
-    };
-
-    /// The first guard to reach its surface in the direction that counts.
-    [[nodiscard]] Approach time_to_surface();
-
-    [[nodiscard]] double approach_rate(std::size_t i);
+    /// The first guard to reach its surface, and the time until then.
+    [[nodiscard]] typename Engine::Approach time_to_surface();
 
     /// The next length to try after one of h that left the domain of the flow or a guard: nine
     /// tenths of the way to a surface that lies within it, else a tenth.
@@ -567,8 +533,8 @@ private:
 
     [[nodiscard]] double smallest_step() const noexcept
     {
-        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
-        return std::max(options_.h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
+        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(now().start().value);
+        return std::max(options().h_min, std::max(4 * ulp, std::numeric_limits<double>::min()));
     }
 
     /// Keeps a motion at rest until a time event or the end.
@@ -579,7 +545,7 @@ private:
     /// Shortens the step to where the flow lifts the guard of a hold. False: the run has ended.
     [[nodiscard]] bool shorten_to_release();
     /// Whether the current step, if it stands, ends where a hold is released.
-    [[nodiscard]] bool ends_at_release() const noexcept { return step_.h() == release_at_; }
+    [[nodiscard]] bool ends_at_release() const noexcept { return now().h() == release_at_; }
     /// Accepts that step, and releases the hold.
     void pass_to_release();
     // --- phases ---
@@ -587,10 +553,10 @@ private:
     /// Lets the phases change after a step, or where the run would end.
     [[gnu::noinline]] void review_phase(bool has_advanced)
     {
-        const double t = step_.start().value;
+        const double t = now().start().value;
         const bool goes_on =
-            !ended_ && phases_->goes_on &&
-            phases_->goes_on(system_.adapter(), step_.mode(), t, step_.x0(), has_advanced);
+            !ended() && phases_->goes_on &&
+            phases_->goes_on(system().adapter(), now().mode(), t, now().x0(), has_advanced);
         if (!goes_on) change_phase(has_advanced);
     }
     void change_phase(bool has_advanced);
@@ -607,7 +573,7 @@ private:
     /// Settles everything that happens at one instant, with the state after it in the solution.
     void settle_and_record()
     {
-        this->settle_all();
+        engine_.settle_all();
         record_restart();
     }
 
@@ -645,17 +611,17 @@ private:
 
     void record_step(double s)
     {
-        if (options_.record_steps && s > 0) {
-            run_.solution.add(step_.time(0), backward_, this->shown(step_.mode()), step_.dense(),
-                              s);
+        if (options().record_steps && s > 0) {
+            result().solution.add(now().time(0), backward_, engine_.shown(now().mode()),
+                                  now().dense(), s);
         }
     }
     /// The part of the step before a set at time t, at whose end is x⁻.
     void record_step_to_set(double s, double t)
     {
-        if (!options_.record_steps || !(s > 0)) return;
+        if (!options().record_steps || !(s > 0)) return;
         record_step(s);
-        run_.solution.end_at(t, search_.before());
+        result().solution.end_at(t, engine_.before());
     }
 
     /// Adds the present state to the solution, kept for a length of time [s], which may be zero.
@@ -693,7 +659,7 @@ private:
     /// Samples of the current step before the time `end` of its offset s, as events record it.
     void emit_samples(double s, double end)
     {
-        if (next_sample_ < options_.sample_times.size()) emit_more_samples(s, end);
+        if (next_sample_ < options().sample_times.size()) emit_more_samples(s, end);
     }
     [[gnu::noinline]] void emit_more_samples(double s, double end);
 
@@ -731,6 +697,14 @@ private:
 
     static constexpr ErrorRule rule_{};
 
+    const RunBindings<X>& setup_;
+    const PhaseTable<X>* phases_;
+    bool error_controlled_;
+    bool guarded_;  ///< has guards, even if their number is zero so far
+    bool timed_;
+    std::conditional_t<single, Never, bool> defers_;  ///< only the loop of any number plans
+    bool backward_;
+    Engine engine_;
     std::size_t components_;         ///< number of components of the state at the start
     QuietKernel<X> quiet_;           ///< null: the loop takes every step itself
     double first_step_ = 0;          ///< [s] length of the first step

@@ -14,10 +14,10 @@ void Loop<X, single>::advance_resumably(const Advance& how)
 {
     mark_step();
     if (phases_) mark_phases();
-    const std::uint64_t steps = run_.statistics.steps;
+    const std::uint64_t steps = result().statistics.steps;
     try {
         advance_from_here(how);
-        if (phases_) review_phase(run_.statistics.steps != steps);
+        if (phases_) review_phase(result().statistics.steps != steps);
     } catch (...) {
         go_back_to_mark();
         throw;
@@ -41,20 +41,20 @@ template <class X, bool single>
 inline void Loop<X, single>::mark_step() noexcept
 {
     mark_->everything = false;
-    mark_->h_next = h_next_;
+    mark_->h_next = h_next();
     if (defers_) {
-        mark_->counts = run_.statistics;
+        mark_->counts = result().statistics;
     } else {
-        mark_->counts.rejected = run_.statistics.rejected;
+        mark_->counts.rejected = result().statistics.rejected;
     }
-    mark_->disabled = search_.disabled;
-    mark_->events = run_.events.size();
-    mark_->samples = run_.trajectory.t.size();
-    mark_->pieces = run_.solution.size();
+    mark_->disabled = engine_.disabled();
+    mark_->events = result().events.size();
+    mark_->samples = result().trajectory.t.size();
+    mark_->pieces = result().solution.size();
     mark_->next_sample = next_sample_;
-    mark_->tentative = defers_ ? planner_->steps().size() : 0;
-    mark_->planned = defers_ && !watching_;
-    mark_->newly_armed = newly_armed_;
+    mark_->tentative = defers_ ? planner().steps().size() : 0;
+    mark_->planned = defers_ && !engine_.watching();
+    mark_->newly_armed = engine_.newly_armed();
 }
 
 /// The phases decide after the step, too, so that everything is kept at its start.
@@ -70,21 +70,12 @@ void Loop<X, single>::copy_to_mark()
 {
     if (!defers_) {
         const std::uint64_t rejected = mark_->counts.rejected;
-        mark_->counts = run_.statistics;
+        mark_->counts = result().statistics;
         mark_->counts.rejected = rejected;
     }
-    if (defers_) {
-        step_.store_as_kept(mark_->start);
-    } else {
-        step_.store(mark_->start);
-    }
-    mark_->guards = guards_;
+    engine_.keep(mark_->at);
     mark_->flight_start = flight_start_;
     mark_->longest_step = longest_step_;
-    mark_->last_h = last_h_;
-    mark_->time_event = time_event();
-    mark_->holds = holds_.keep();
-    mark_->watching = watching_;
     mark_->everything = true;
 }
 
@@ -93,40 +84,25 @@ template <class X, bool single>
 void Loop<X, single>::rewind_counts(const Mark& mark, std::uint64_t steps, std::uint64_t rejected)
 {
     if (mark.everything || defers_) {
-        const Statistics seen = std::exchange(run_.statistics, mark.counts);
-        run_.statistics.guard_calls = seen.guard_calls;
-        run_.statistics.network_calls = seen.network_calls;
-        run_.statistics.bound_calls = seen.bound_calls;
+        const Statistics seen = std::exchange(result().statistics, mark.counts);
+        result().statistics.guard_calls = seen.guard_calls;
+        result().statistics.network_calls = seen.network_calls;
+        result().statistics.bound_calls = seen.bound_calls;
     }
-    run_.statistics.rejected = rejected;
-    run_.statistics.steps = steps;
-    search_.disabled = mark.disabled;
-}
-
-/// Puts back what a search for events, or a time event, changes.
-template <class X, bool single>
-void Loop<X, single>::put_back_everything(const Mark& mark)
-{
-    step_.restart(mark.start);
-    guards_ = mark.guards;
-    flight_start_ = mark.flight_start;
-    longest_step_ = mark.longest_step;
-    last_h_ = mark.last_h;
-    time_events_.put_back(mark.time_event);
-    holds_.put_back(mark.holds);
-    this->heed_holds();
-    watching_ = mark.watching;
+    result().statistics.rejected = rejected;
+    result().statistics.steps = steps;
+    engine_.disabled() = mark.disabled;
 }
 
 /// Drops what has been recorded since the mark.
 template <class X, bool single>
 void Loop<X, single>::cut_records(const Mark& mark, std::size_t samples, std::size_t pieces)
 {
-    run_.events.resize(mark.events);
-    run_.trajectory.t.resize(samples);
-    run_.trajectory.x.resize(samples);
-    if (run_.reactions.size() > samples) run_.reactions.resize(samples);
-    run_.solution.shrink(pieces);
+    result().events.resize(mark.events);
+    result().trajectory.t.resize(samples);
+    result().trajectory.x.resize(samples);
+    if (result().reactions.size() > samples) result().reactions.resize(samples);
+    result().solution.shrink(pieces);
     next_sample_ = mark.next_sample;
 }
 
@@ -137,21 +113,22 @@ void Loop<X, single>::go_back_to_mark()
     std::size_t samples = mark.samples;
     std::size_t pieces = mark.pieces;
     std::uint64_t rejected = mark.counts.rejected;
-    std::uint64_t steps = defers_ ? mark.counts.steps : run_.statistics.steps;
+    std::uint64_t steps = defers_ ? mark.counts.steps : result().statistics.steps;
     if (mark.everything) {
         steps = mark.counts.steps;
-        put_back_everything(mark);
+        engine_.put_back(mark.at);
+        flight_start_ = mark.flight_start;
+        longest_step_ = mark.longest_step;
     } else if (defers_) {
-        step_.put_back_rate();
+        now().put_back_rate();
     }
-    h_next_ = mark.h_next;
+    h_next() = mark.h_next;
     if (phases_) phases_->restore(phases_->adapter, mark.phases);
-    newly_armed_ = mark.newly_armed;
     if (mark.tentative > 0) {
-        const auto& first = planner_->steps()[0];
-        step_.restart(first.start);
-        h_next_ = first.h_next;
-        last_h_ = first.last_h;
+        const auto& first = planner().steps()[0];
+        now().restart(first.start);
+        h_next() = first.h_next;
+        engine_.last_h() = first.last_h;
         samples -= mark.next_sample - first.samples;
         pieces = first.pieces;
         rejected = first.rejected;
@@ -159,26 +136,17 @@ void Loop<X, single>::go_back_to_mark()
         mark.next_sample = first.samples;
     }
     if (defers_) {
-        planner_->steps().clear();
-        planner_->forget_wrong();
+        planner().steps().clear();
+        planner().forget_wrong();
     }
     if (mark.planned) {
         // Deadlines may be half renewed: they are found again at the start of the step.
         replans_ = true;
-        watching_ = false;
+        engine_.watch_no_more();
     }
     rewind_counts(mark, steps, rejected);
     cut_records(mark, samples, pieces);
-    run_.outcome = Outcome::reached_end;
-    this->forget_cause();
-    ended_ = false;
-    pending_ = Engine::Pending::nothing;
-    change_due_ = on_change_ = false;
-    time_events_.forget_here();
-    if (guarded_) {
-        search_.fired().clear();
-        search_.begin(step_.x0());
-    }
+    engine_.forget_exception(mark.newly_armed);
 }
 
 }  // namespace ricochet::detail

@@ -23,7 +23,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
     old.run = properties();
     require_same_run(snapshot.run, old.run);
     visit_state(SnapshotWriter(old));
-    std::vector<MotionPhase> phases = run_.phases;
+    std::vector<MotionPhase> phases = result().phases;
     try {
         SnapshotReader reader(snapshot);
         visit_state(reader);
@@ -32,54 +32,45 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
         refuse_bad_place();
     } catch (const std::invalid_argument&) {
         visit_state(SnapshotReader(old));
-        run_.phases = std::move(phases);
+        result().phases = std::move(phases);
         throw;
     }
     go_on_from_place();
     show_all();
-    if (ended_ && phases_ && phases_->reaction) run_.reaction = reaction_here();
+    if (ended() && phases_ && phases_->reaction) result().reaction = reaction_here();
 }
 
 template <class X, bool single>
 inline void Loop<X, single>::go_on_from_place()
 {
-    holds_.resume();
-    this->heed_holds();
-    step_.restart(place_);
+    engine_.go_on_from(place_);
     next_review_ = 0;
-    watching_ = replans_ = change_due_ = on_change_ = false;
-    time_events_.forget_here();
-    if (guarded_) search_.begin(step_.x0());
-    if (defers_) planner_->restore(guards_);
+    replans_ = false;
 }
 
 template <class X, bool single>
 template <class Visitor>
 inline void Loop<X, single>::visit_state(Visitor&& visit)
 {
-    if constexpr (std::remove_cvref_t<Visitor>::saves) place_ = step_.place();
+    if constexpr (std::remove_cvref_t<Visitor>::saves) place_ = now().place();
     visit(place_.t.value);
     visit(place_.t.remainder);
     visit(place_.mode);
     for (X* x : {&place_.x, &place_.remainder, &place_.rate}) visit.state(*x);
-    visit(h_next_);
+    visit(h_next());
     visit(first_step_);
     visit(flight_start_);
     visit(longest_step_);
-    time_events_.visit(visit);
+    engine_.visit_time_event(visit);
     if (timed_) visit(place_.is_beyond);
-    holds_.visit(visit);
-    visit(ended_);
-    visit(run_.outcome);
+    engine_.holds().visit(visit);
+    engine_.visit_ended(visit);
+    visit(result().outcome);
     visit_cause(visit);
     visit_samples(visit);
-    this->visit_guards(visit);
+    engine_.visit_guards(visit);
     if (phases_) visit_phases(visit);
-    if (defers_) {
-        visit(last_h_);
-        visit(newly_armed_);
-        planner_->visit(visit);
-    }
+    engine_.visit_planner(visit);
 }
 
 template <class X, bool single>
@@ -97,13 +88,12 @@ void Loop<X, single>::visit_phases(Visitor&& visit)
 template <class X, bool single>
 inline void Loop<X, single>::reopen() noexcept
 {
-    const auto ended_by = [this](Outcome outcome) { return run_.outcome == outcome; };
-    const bool short_of_end = lies_before(place_.t.value, options_.t_end);
-    const bool has_steps = run_.statistics.steps < options_.max_steps;
+    const auto ended_by = [this](Outcome outcome) { return result().outcome == outcome; };
+    const bool short_of_end = lies_before(place_.t.value, options().t_end);
+    const bool has_steps = result().statistics.steps < options().max_steps;
     if (ended_by(Outcome::cancelled) || (ended_by(Outcome::reached_end) && short_of_end) ||
         (ended_by(Outcome::step_limit) && has_steps) || ended_by(Outcome::stalled)) {
-        ended_ = false;
-        run_.outcome = Outcome::reached_end;
+        engine_.reopen();
     }
 }
 
@@ -112,13 +102,13 @@ template <class Visitor>
 inline void Loop<X, single>::visit_cause(Visitor&& visit)
 {
     constexpr bool saves = std::remove_cvref_t<Visitor>::saves;
-    if constexpr (!saves) this->forget_cause();
-    if (!ended_) return;
-    visit(run_.guard);
-    visit(run_.other_guard);
-    if (run_.outcome != Outcome::wrong_bound) return;
-    if constexpr (!saves) run_.wrong_bound.emplace().x = place_.x;
-    WrongBound<X>& wrong = *run_.wrong_bound;
+    if constexpr (!saves) engine_.forget_cause();
+    if (!ended()) return;
+    visit(result().guard);
+    visit(result().other_guard);
+    if (result().outcome != Outcome::wrong_bound) return;
+    if constexpr (!saves) result().wrong_bound.emplace().x = place_.x;
+    WrongBound<X>& wrong = *result().wrong_bound;
     visit(wrong.guard);
     visit(wrong.lower_bound);
     visit(wrong.upper_bound);
@@ -133,7 +123,7 @@ template <class X, bool single>
 template <class Visitor>
 inline void Loop<X, single>::visit_samples(Visitor&& visit)
 {
-    const auto& times = options_.sample_times;
+    const auto& times = options().sample_times;
     double written = next_sample_ > 0 ? times[next_sample_ - 1] : -infinity;
     if (backward_ && next_sample_ == 0) written = infinity;
     visit(written);

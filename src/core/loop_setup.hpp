@@ -29,14 +29,14 @@ inline std::vector<RunProperty> Loop<X, single>::properties() const
 {
     const int order = setup_.method_by_name ? setup_.kernel->order : setup_.order;
     const std::string of_order = order > 0 ? " of order " + std::to_string(order) : "";
-    return properties_of_run({.system = system_->name(system_.adapter()),
+    return properties_of_run({.system = system()->name(system().adapter()),
                               .stepping = plain_type_name(setup_.stepping) + of_order,
-                              .detector = plain_type_name(finders_.detector.type),
-                              .locator = plain_type_name(finders_.locator.type),
+                              .detector = plain_type_name(engine_.finders().detector.type),
+                              .locator = plain_type_name(engine_.finders().locator.type),
                               .components = components_,
-                              .guards = guards_.size(),
+                              .guards = engine_.guards().size(),
                               .error_controlled = error_controlled_},
-                             options_);
+                             options());
 }
 
 template <class X, bool single>
@@ -47,35 +47,37 @@ inline void Loop<X, single>::refuse_bad_place() const
     };
     const auto components = static_cast<std::size_t>(place_.x.size());
     const bool may_shrink =
-        (system_->moded || system_->changes_dimension) && !system_->fixed_dimension;
-    require((system_->fixed_dimension ? components == components_
-                                      : components >= (may_shrink ? 1 : components_)) &&
+        (system()->moded || system()->changes_dimension) && !system()->fixed_dimension;
+    require((system()->fixed_dimension ? components == components_
+                                       : components >= (may_shrink ? 1 : components_)) &&
                 place_.remainder.size() == place_.x.size() && place_.rate.size() == place_.x.size(),
             "the number of components");
-    if (lies_before(options_.t_end, place_.t.value)) {
-        throw_snapshot_later(place_.t.value, options_.t_end);
+    if (lies_before(options().t_end, place_.t.value)) {
+        throw_snapshot_later(place_.t.value, options().t_end);
     }
     const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(place_.t.value);
     require(std::isfinite(place_.t.value) && std::fabs(place_.t.remainder) <= ulp &&
-                !lies_before(place_.t.value, options_.t_start),
+                !lies_before(place_.t.value, options().t_start),
             "the time");
-    require(
-        ended_ || (all_finite(place_.x) && all_finite(place_.remainder) && all_finite(place_.rate)),
-        "the state");
-    require(
-        h_next_ > 0 && std::isfinite(h_next_) && (!error_controlled_ || h_next_ <= options_.h_max),
-        "the next step");
+    require(ended() ||
+                (all_finite(place_.x) && all_finite(place_.remainder) && all_finite(place_.rate)),
+            "the state");
+    require(h_next() > 0 && std::isfinite(h_next()) &&
+                (!error_controlled_ || h_next() <= options().h_max),
+            "the next step");
     require(first_step_ > 0 && std::isfinite(first_step_), "the first step");
     require(std::isfinite(flight_start_) && longest_step_ >= 0 && std::isfinite(longest_step_),
             "the last event");
-    require(ended_ || lies_before(place_.t.value, time_event()) || !timed_, "the next time event");
-    const std::size_t modes = this->modes();
+    require(ended() || lies_before(place_.t.value, time_event()) || !timed_, "the next time event");
+    const std::size_t modes = engine_.modes();
     require(modes == 0 || place_.mode < modes, "the mode");
-    require(holds_.fit(components), "what a rest holds");
-    const auto is_guard = [this](std::size_t i) { return i == no_guard || i < guards_.size(); };
-    require(is_guard(run_.guard) &&
-                (is_guard(run_.other_guard) || run_.other_guard == time_event_reset) &&
-                (!run_.wrong_bound || is_guard(run_.wrong_bound->guard)),
+    require(engine_.holds().fit(components), "what a rest holds");
+    const auto is_guard = [this](std::size_t i) {
+        return i == no_guard || i < engine_.guards().size();
+    };
+    require(is_guard(result().guard) &&
+                (is_guard(result().other_guard) || result().other_guard == time_event_reset) &&
+                (!result().wrong_bound || is_guard(result().wrong_bound->guard)),
             "the guard that ended the run");
 }
 

@@ -42,28 +42,31 @@ template <class X>
 inline constexpr StepKernel<X> host_kernel{};
 
 template <class X, bool single>
-class MonitorLoop : public AnyMonitor<X>, private EventEngine<X, single> {
+class MonitorLoop : public AnyMonitor<X> {
     using Engine = EventEngine<X, single>;
-    using typename Engine::Pending;
+    using Pending = typename Engine::Pending;
     static constexpr std::string_view who = "EventMonitor";
 
 public:
     /// Keeps a reference to `setup`.
     MonitorLoop(const RunBindings<X>& setup, const X& like, const Options& options,
                 bool cuts_at_all)
-        : Engine(setup, like, options), components_(static_cast<std::size_t>(like.size()))
+        : guarded_(setup.system->guarded),
+          timed_(setup.system->timed()),
+          defers_(defers(setup.detector, *setup.system)),
+          backward_(options.t_end < options.t_start),
+          engine_(setup, like, options, {.who = who, .cuts_at_all = cuts_at_all}),
+          components_(static_cast<std::size_t>(like.size()))
     {
-        this->who_ = who;
-        this->cuts_at_all_ = cuts_at_all;
         if (!guarded_ && !timed_) {
             throw_without_events();
         }
-        if (guarded_) this->refuse_bad_guards();
+        if (guarded_) engine_.refuse_bad_guards();
         if (setup.detector.check) {
             setup.detector.check(setup.detecting, setup.adapter, like, 0, Engine::infinity);
         }
         cut_.before = cut_.after = like;
-        cut_.fired.reserve(std::max<std::size_t>(guards_.size(), 1));
+        cut_.fired.reserve(std::max<std::size_t>(engine_.guards().size(), 1));
     }
 
     Verdict start(const Instant& t, const X& x, const double* dxdt, Mode mode,
@@ -71,24 +74,16 @@ public:
     {
         require_finite(t, x);
         require_length("the scale of `start`", scale);
-        options_.t_start = t.value;
-        options_.mode = mode;
-        this->refuse_bad_modes();
-        started_ = ended_ = this->stops_ = false;
-        this->forget_holds();
-        run_.outcome = Outcome::reached_end;
-        this->forget_cause();
-        this->pending_ = Pending::nothing;
-        this->sets_.begin_instant();
-        search_.fired().clear();
-        if (defers_) planner_->forget_wrong();
-        step_.restart(t, x, mode);
+        engine_.options().t_start = t.value;
+        engine_.options().mode = mode;
+        engine_.refuse_bad_modes();
+        started_ = false;
+        engine_.forget_run();
+        now().restart(t, x, mode);
         place_rate(dxdt);
-        h_next_ = scale;
-        time_events_.forget();
-        if (timed_) this->find_time_event(Engine::After::start);
-        guards_.forget();
-        if (guarded_) this->arm_at_start(!options_.continues);
+        h_next() = scale;
+        if (timed_) engine_.find_time_event(Engine::After::start);
+        if (guarded_) engine_.arm_at_start(!options().continues);
         started_ = true;
         return or_start_anew([&] { return go_on(); });
     }
@@ -97,42 +92,42 @@ public:
     {
         require_turn("examine");
         require_next(step);
-        time_event_due_ = timed_ && ends_at_time_event(step);
+        engine_.ends_at().time_event = timed_ && ends_at_time_event(step);
         return or_start_anew([&] { return check_at(step); });
     }
 
     Verdict resume(const double* dxdt, double scale) override
     {
-        if (this->pending_ == Pending::nothing || ended_) {
+        if (engine_.pending() == Pending::nothing || ended()) {
             throw_out_of_turn("resume", "it after a verdict `cut` alone");
         }
         require_length("the scale of `resume`", scale);
         return or_start_anew([&] {
             place_rate(dxdt);
-            h_next_ = scale;
+            h_next() = scale;
             return go_on();
         });
     }
 
     Verdict resume(const X& after, Mode mode, const double* dxdt, double scale) override
     {
-        if (this->pending_ == Pending::nothing || ended_) {
+        if (engine_.pending() == Pending::nothing || ended()) {
             throw_out_of_turn("resume", "it after a verdict `cut` alone");
         }
-        require_finite(step_.start(), after);
+        require_finite(now().start(), after);
         require_length("the scale of `resume`", scale);
-        const std::size_t modes = this->modes();
+        const std::size_t modes = engine_.modes();
         if (modes > 0 && mode >= modes) throw_unknown_mode(who, mode, modes);
-        step_.restart(step_.start(), after, mode);
+        now().restart(now().start(), after, mode);
         return resume(dxdt, scale);
     }
 
     Verdict hold(double t) override
     {
-        if (!holds_.rests() || ended_)
+        if (!engine_.holds().rests() || ended())
             throw_out_of_turn("hold", "it after a verdict `rests` alone");
-        if (!lies_before(step_.start().value, t) || !std::isfinite(t)) {
-            throw_hold_not_ahead(step_.start().value, t);
+        if (!lies_before(now().start().value, t) || !std::isfinite(t)) {
+            throw_hold_not_ahead(now().start().value, t);
         }
         const bool due = timed_ && !lies_before(t, time_event());
         if (due && t != time_event()) throw_beyond_time_event(time_event(), t);
@@ -140,52 +135,52 @@ public:
     }
 
     [[nodiscard]] const Cut<X>& cut() const noexcept override { return cut_; }
-    [[nodiscard]] Instant t() const noexcept override { return step_.start(); }
-    [[nodiscard]] const X& x() const noexcept override { return step_.x0(); }
-    [[nodiscard]] Mode mode() const noexcept override { return step_.mode(); }
+    [[nodiscard]] Instant t() const noexcept override { return now().start(); }
+    [[nodiscard]] const X& x() const noexcept override { return now().x0(); }
+    [[nodiscard]] Mode mode() const noexcept override { return now().mode(); }
     [[nodiscard]] double must_stop_at() const noexcept override { return time_event(); }
     [[nodiscard]] std::span<const std::size_t> held() const noexcept override
     {
-        return step_.held();
+        return now().held();
     }
     [[nodiscard]] double quiet_until() const noexcept override
     {
         if (!guarded_) return backward_ ? -Engine::infinity : Engine::infinity;
-        const bool planned = defers_ && started_ && !ended_ && !holds_.rests() && !newly_armed_ &&
-                             this->pending_ == Pending::nothing;
-        return planned ? clock(planner_->limit()) : step_.start().value;
+        const bool planned = defers_ && started_ && !ended() && !engine_.holds().rests() &&
+                             !engine_.newly_armed() && engine_.pending() == Pending::nothing;
+        return planned ? clock(planner().limit()) : now().start().value;
     }
 
     void skip_to(const Instant& t, const X& x, const double* dxdt) override
     {
         require_turn("skip_to");
-        if (clock(t.value) < clock(step_.start().value)) throw_gap(step_.start().value, t.value);
+        if (clock(t.value) < clock(now().start().value)) throw_gap(now().start().value, t.value);
         if (!(clock(t.value) <= clock(quiet_until()))) throw_not_quiet(quiet_until(), t.value);
         if (timed_ && !lies_before(t.value, time_event())) {
             throw_beyond_time_event(time_event(), t.value);
         }
         require_finite(t, x);
-        if (quiet_until() == step_.start().value && !same_state(x, step_.x0())) {
+        if (quiet_until() == now().start().value && !same_state(x, now().x0())) {
             throw_not_quiet(quiet_until(), t.value);
         }
-        step_.restart(t, x, step_.mode());
+        now().restart(t, x, now().mode());
         place_rate(dxdt);
-        ++run_.statistics.steps;
-        this->count_deferred(1);
+        ++result().statistics.steps;
+        engine_.count_deferred(1);
     }
 
     [[nodiscard]] Side side(std::size_t guard) const override
     {
-        if (guard >= guards_.size()) throw_no_such_guard(guard, guards_.size());
-        return guards_[guard].side;
+        if (guard >= engine_.guards().size()) throw_no_such_guard(guard, engine_.guards().size());
+        return engine_.guards()[guard].side;
     }
     [[nodiscard]] const Run<X>& run() noexcept override
     {
-        this->collect_counts();
-        this->list_armed_beyond();
-        return run_;
+        engine_.collect_counts();
+        engine_.list_armed_beyond();
+        return result();
     }
-    void clear_events() noexcept override { run_.events.clear(); }
+    void clear_events() noexcept override { result().events.clear(); }
 
     [[nodiscard]] Snapshot save() override
     {
@@ -212,47 +207,32 @@ public:
             started_ = had_started;
             throw;
         }
-        holds_.resume();
-        this->heed_holds();
-        step_.restart(place_);
-        this->watching_ = false;
-        time_events_.forget_here();
-        this->forget_cause();
-        this->pending_ = Pending::nothing;
+        engine_.go_on_from(place_);
+        engine_.forget_cause();
         started_ = true;
-        if (guarded_) search_.begin(step_.x0());
-        if (defers_) planner_->restore(guards_);
     }
 
 private:
-    using Engine::backward_;
-    using Engine::defers_;
-    using Engine::ended_;
-    using Engine::finders_;
-    using Engine::guarded_;
-    using Engine::guards_;
-    using Engine::h_next_;
-    using Engine::holds_;
-    using Engine::newly_armed_;
-    using Engine::options_;
-    using Engine::planner_;
-    using Engine::run_;
-    using Engine::search_;
-    using Engine::step_;
-    using Engine::system_;
-    using Engine::time_event;
-    using Engine::time_event_due_;
-    using Engine::time_events_;
-    using Engine::timed_;
+    [[nodiscard]] Step<X>& now() noexcept { return engine_.step(); }
+    [[nodiscard]] const Step<X>& now() const noexcept { return engine_.step(); }
+    [[nodiscard]] Run<X>& result() noexcept { return engine_.run(); }
+    [[nodiscard]] const Options& options() const noexcept { return engine_.options(); }
+    [[nodiscard]] const SystemAt<X>& system() const noexcept { return engine_.system(); }
+    [[nodiscard]] Planner<X, single>& planner() noexcept { return engine_.planner(); }
+    [[nodiscard]] const Planner<X, single>& planner() const noexcept { return engine_.planner(); }
+    [[nodiscard]] double& h_next() noexcept { return engine_.h_next(); }
+    [[nodiscard]] double h_next() const noexcept { return engine_.h_next(); }
+    [[nodiscard]] double time_event() const noexcept { return engine_.time_event(); }
+    [[nodiscard]] bool ended() const noexcept { return engine_.ended(); }
 
     // --- calls out of turn ---
 
     void require_turn(std::string_view call) const
     {
         if (!started_) throw_out_of_turn(call, "`start` before it");
-        if (this->pending_ != Pending::nothing) throw_out_of_turn(call, "`resume` after a cut");
-        if (ended_) throw_out_of_turn(call, "`start` after the end of a run");
-        if (holds_.rests() && call == "examine")
+        if (engine_.pending() != Pending::nothing) throw_out_of_turn(call, "`resume` after a cut");
+        if (ended()) throw_out_of_turn(call, "`start` after the end of a run");
+        if (engine_.holds().rests() && call == "examine")
             throw_out_of_turn(call, "`hold` where the motion rests");
     }
 
@@ -278,14 +258,14 @@ private:
     void require_next(const HostStepTable& step) const
     {
         require_length("the length of a step", step.h);
-        const double gap = std::fabs(step_.until(step.t));
-        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(step_.start().value);
-        if (!(gap <= 4 * ulp + 1e-9 * step.h)) throw_gap(step_.start().value, step.t);
-        const X& x = step_.x0();
+        const double gap = std::fabs(now().until(step.t));
+        const double ulp = std::numeric_limits<double>::epsilon() * std::fabs(now().start().value);
+        if (!(gap <= 4 * ulp + 1e-9 * step.h)) throw_gap(now().start().value, step.t);
+        const X& x = now().x0();
         for (std::size_t i = 0; i < x.size(); ++i) {
             if (!(x[i] == step.x0[i])) throw_state_moved(i, x[i], step.x0[i]);
         }
-        for (const std::size_t i : step_.held()) {
+        for (const std::size_t i : now().held()) {
             if (!(x[i] == step.x1[i])) throw_held_moved(i, x[i], step.x1[i]);
         }
     }
@@ -316,9 +296,9 @@ private:
             return function();
         } catch (...) {
             started_ = false;
-            this->forget_holds();
-            this->pending_ = Pending::nothing;
-            step_.restart(step_.start(), step_.x0(), step_.mode());
+            engine_.holds().forget();
+            engine_.drop_pending();
+            now().restart(now().start(), now().x0(), now().mode());
             throw;
         }
     }
@@ -326,74 +306,75 @@ private:
     [[nodiscard]] Verdict check_at(const HostStepTable& step)
     {
         show(step);
-        if (!holds_.empty()) return check_held(step);
+        if (!engine_.holds().empty()) return check_held(step);
         return check_shown(step);
     }
 
     void show(const HostStepTable& step)
     {
-        step_.show(step);
-        if (std::exchange(departs_, false)) step_.align_start();
-        h_next_ = step.h;
-        this->sets_.begin_instant();
+        now().show(step);
+        if (std::exchange(departs_, false)) now().align_start();
+        h_next() = step.h;
+        engine_.begin_instant();
     }
 
     /// Examines a step in which components are held, no farther than to where they are released.
     [[nodiscard]] Verdict check_held(const HostStepTable& step)
     {
-        const auto release = holds_.first_release(step.h, [this, &step](double s, X& x) {
-            if (s == step.h) return assign(x, step_.x1());
-            s == 0 ? assign(x, step_.x0()) : step_.interpolate(s, x);
+        const auto release = engine_.holds().first_release(step.h, [this, &step](double s, X& x) {
+            if (s == step.h) return assign(x, now().x1());
+            s == 0 ? assign(x, now().x0()) : now().interpolate(s, x);
         });
-        const bool released = release.hold != no_guard && (release.at < step.h || !time_event_due_);
+        const bool released =
+            release.hold != no_guard && (release.at < step.h || !engine_.ends_at().time_event);
         if (!released) {
-            const std::size_t left = holds_.guard_left_at(step_.time(step.h), step_.x1());
+            const std::size_t left = engine_.holds().guard_left_at(now().time(step.h), now().x1());
             if (left != no_guard) {
-                this->end(Outcome::zeno, left);
-                step_.restart(step_.start(), step_.x0(), step_.mode());
+                engine_.end(Outcome::zeno, left);
+                now().restart(now().start(), now().x0(), now().mode());
                 return Verdict::ended;
             }
             return check_shown(step);
         }
-        X end = step_.x0(), rate = end;
+        X end = now().x0(), rate = end;
         HostStepTable part = step;
         if (release.at < step.h) {
-            step_.restep(release.at, end);
-            step_.flow(release.at, end, rate);
+            now().restep(release.at, end);
+            now().flow(release.at, end, rate);
             part.h = release.at;
             part.x1 = end.data();
             part.rate1 = rate.data();
             part.is_cubic = false;
-            time_event_due_ = false;
-            departs_ = step_.is_aligned();
+            engine_.ends_at().time_event = false;
+            departs_ = now().is_aligned();
             show(part);
         }
         const Verdict verdict = check_shown(part);
         if (verdict != Verdict::stands) return verdict;
         cut_.s = part.h;
-        this->release_here(release.hold);
+        engine_.release_here(release.hold);
         return show_set();
     }
 
     [[nodiscard]] Verdict check_shown(const HostStepTable& step)
     {
         if (holds_set()) {
-            cut_.s = search_.at();
-            this->cut_short();
+            cut_.s = engine_.set_offset();
+            engine_.cut_short();
             return show_set();
         }
-        if (ended_) {
-            step_.restart(step_.start(), step_.x0(), step_.mode());
+        if (ended()) {
+            now().restart(now().start(), now().x0(), now().mode());
             return Verdict::ended;
         }
-        if (time_event_due_) assign(this->left_start_, step_.rate0());
-        step_.accept_shown();
-        ++run_.statistics.steps;
-        this->last_h_ = step.h;
-        if (!time_event_due_) return Verdict::stands;
+        if (engine_.ends_at().time_event) engine_.keep_flow_at_start();
+        now().accept_shown();
+        ++result().statistics.steps;
+        engine_.last_h() = step.h;
+        if (!engine_.ends_at().time_event) return Verdict::stands;
         cut_.s = step.h;
-        step_.hold(time_event());
-        this->apply_time_event(step.h);
+        now().hold(time_event());
+        engine_.apply_at_end(step.h);
         return show_set();
     }
 
@@ -401,45 +382,45 @@ private:
     [[nodiscard]] bool holds_set()
     {
         // Bounds are those of the flow, and not of what a rest leaves of it.
-        const bool plans = defers_ && holds_.empty() && !planner_->steps_aside();
+        const bool plans = defers_ && engine_.holds().empty() && !planner().steps_aside();
         if (plans) return holds_set_by_plan();
-        if (defers_) this->watch_all();
+        if (defers_) engine_.watch_all();
         bool cleared = false;
-        return this->deserves_search(cleared) && finds(cleared);
+        return engine_.deserves_search(cleared) && finds(cleared);
     }
 
     [[nodiscard]] bool finds(bool cleared)
     {
-        std::size_t broken = guards_.first_not_finite();
-        if (broken == no_guard) broken = guards_.first_without_rate();  // the host no longer has it
-        if (broken == no_guard) return this->find(cleared);
-        this->end_not_finite("", broken);
+        std::size_t broken = engine_.guards().first_not_finite();
+        if (broken == no_guard)
+            broken = engine_.guards().first_without_rate();  // the host no longer has it
+        if (broken == no_guard) return engine_.find(cleared);
+        engine_.end_not_finite("", broken);
         return false;
     }
 
     /// Plans with intervals of a single step, since a host does not return to earlier steps.
     [[nodiscard]] bool holds_set_by_plan()
     {
-        if (newly_armed_) this->begin_plan();
-        const double end = clock(step_.time(step_.h()));
+        if (engine_.newly_armed()) engine_.begin_plan();
+        const double end = clock(now().time(now().h()));
         bool found = false;
-        if (planner_->covers(end)) {
-            planner_->sample_sleeper(step_, guards_, run_.statistics);
-            this->count_deferred(1);
+        if (planner().covers(end)) {
+            if (engine_.sample_sleeper()) return false;
+            engine_.count_deferred(1);
         } else {
-            step_.store(planner_->steps().add().start);
-            planner_->overrun(end);
-            const std::size_t doubt = planner_->close(step_, guards_, run_.statistics, h_next_);
-            planner_->steps().clear();
+            now().store(planner().steps().add().start);
+            planner().overrun(end);
+            const std::size_t doubt = engine_.close_interval();
+            planner().steps().clear();
             if (doubt == Planner<X, single>::none) {
-                this->count_deferred(1);
-            } else if (!planner_->wrong()) {
-                found = this->judges_suspicious() && finds(false);
-                if (!found && !ended_) planner_->settle(step_, guards_, run_.statistics);
+                engine_.count_deferred(1);
+            } else if (!planner().wrong()) {
+                found = engine_.judges_suspicious() && finds(false);
+                if (!found && !ended() && engine_.settle_verified()) return false;
             }
         }
-        if (planner_->wrong()) this->name_wrong_bound();
-        return found && !ended_;
+        return !engine_.has_wrong_bound() && found;
     }
 
     [[nodiscard]] double clock(double t) const noexcept { return backward_ ? -t : t; }
@@ -449,25 +430,25 @@ private:
     [[nodiscard]] Verdict hold_until(double t, bool due)
     {
         cut_.s = 0;
-        const double length = step_.until(t);
-        const auto kept = [this](double, X& x) { assign(x, step_.x0()); };
-        const auto release = holds_.first_release(length, kept);
+        const double length = now().until(t);
+        const auto kept = [this](double, X& x) { assign(x, now().x0()); };
+        const auto release = engine_.holds().first_release(length, kept);
         if (release.hold != no_guard && (release.at < length || !due)) {
-            step_.hold(release.at < length ? step_.time(release.at) : t);
-            this->sets_.begin_instant();
-            this->release_here(release.hold);
+            now().hold(release.at < length ? now().time(release.at) : t);
+            engine_.begin_instant();
+            engine_.release_here(release.hold);
             return show_set();
         }
-        const std::size_t left = holds_.guard_left_at(t, step_.x0());
+        const std::size_t left = engine_.holds().guard_left_at(t, now().x0());
         if (left != no_guard) {
-            this->end(Outcome::zeno, left);
+            engine_.end(Outcome::zeno, left);
             return Verdict::ended;
         }
-        step_.hold(t);
+        now().hold(t);
         if (!due) return Verdict::rests;
-        this->sets_.begin_instant();
-        step_.refresh();
-        this->apply_time_event();
+        engine_.begin_instant();
+        now().refresh();
+        engine_.apply_time_event();
         return show_set();
     }
 
@@ -475,22 +456,22 @@ private:
 
     void place_rate(const double* dxdt)
     {
-        if (dxdt) return step_.set_rate(dxdt);
-        step_.refresh();
-        if (!step_.flow_fits()) throw_flow_does_not_fit(who, step_.x0().size());
+        if (dxdt) return now().set_rate(dxdt);
+        now().refresh();
+        if (!now().flow_fits()) throw_flow_does_not_fit(who, now().x0().size());
     }
 
     /// Arms the guards; a set that follows at the same instant is returned as another cut.
     Verdict go_on()
     {
         departs_ = true;
-        assign(cut_.before, step_.x0());
-        cut_.mode_before = step_.mode();
-        if (!this->settle()) {
-            if (ended_) return Verdict::ended;
-            if (holds_.rests()) return Verdict::rests;
-            const bool plans = defers_ && holds_.empty() && !planner_->steps_aside();
-            if (plans) this->begin_plan();
+        assign(cut_.before, now().x0());
+        cut_.mode_before = now().mode();
+        if (!engine_.settle()) {
+            if (ended()) return Verdict::ended;
+            if (engine_.holds().rests()) return Verdict::rests;
+            const bool plans = defers_ && engine_.holds().empty() && !planner().steps_aside();
+            if (plans) engine_.begin_plan();
             return Verdict::stands;
         }
         cut_.s = 0;
@@ -499,23 +480,23 @@ private:
 
     Verdict show_set()
     {
-        if (this->pending_ == Pending::nothing) return Verdict::ended;
-        cut_.t = step_.start();
-        const bool released = this->pending_ == Pending::arm_released;
-        cut_.accumulation = this->pending_ != Pending::settle && !released;
+        if (engine_.pending() == Pending::nothing) return Verdict::ended;
+        cut_.t = now().start();
+        const bool released = engine_.pending() == Pending::arm_released;
+        cut_.accumulation = engine_.pending() != Pending::settle && !released;
         if (released) {
-            assign(cut_.before, step_.x0());
-            cut_.mode_before = step_.mode();
+            assign(cut_.before, now().x0());
+            cut_.mode_before = now().mode();
         } else if (!cut_.accumulation) {
-            assign(cut_.before, search_.before());
-            cut_.mode_before = this->mode_before_;
+            assign(cut_.before, engine_.before());
+            cut_.mode_before = engine_.mode_before();
         }
-        assign(cut_.after, step_.x0());
-        cut_.mode_after = step_.mode();
-        cut_.on_time = !cut_.accumulation && !released && this->on_time_;
+        assign(cut_.after, now().x0());
+        cut_.mode_after = now().mode();
+        cut_.on_time = !cut_.accumulation && !released && engine_.is_on_time();
         // The rates of a motion that goes free are not those of the state that was kept.
         cut_.state_changed = released || !same_state(cut_.before, cut_.after);
-        cut_.fired.assign(search_.fired().begin(), search_.fired().end());
+        cut_.fired.assign(engine_.fired().begin(), engine_.fired().end());
         std::sort(cut_.fired.begin(), cut_.fired.end());
         return Verdict::cut;
     }
@@ -524,10 +505,10 @@ private:
 
     [[nodiscard]] std::vector<RunProperty> properties() const
     {
-        return {{"monitor of", system_->name(system_.adapter())},
-                {"detector", plain_type_name(finders_.detector.type)},
-                {"locator", plain_type_name(finders_.locator.type)},
-                {"guards", std::to_string(guards_.size())},
+        return {{"monitor of", system()->name(system().adapter())},
+                {"detector", plain_type_name(engine_.finders().detector.type)},
+                {"locator", plain_type_name(engine_.finders().locator.type)},
+                {"guards", std::to_string(engine_.guards().size())},
                 {"components", std::to_string(components_)},
                 {"direction", backward_ ? "backward" : "forward"}};
     }
@@ -543,34 +524,34 @@ private:
         require(std::isfinite(place_.t.value) && std::isfinite(place_.t.remainder), "the time");
         require(all_finite(place_.x) && all_finite(place_.remainder), "the state");
         require(!timed_ || lies_before(place_.t.value, time_event()), "the next time event");
-        require(h_next_ > 0 && std::isfinite(h_next_), "the scale");
-        const std::size_t modes = this->modes();
+        require(h_next() > 0 && std::isfinite(h_next()), "the scale");
+        const std::size_t modes = engine_.modes();
         require(modes == 0 || place_.mode < modes, "the mode");
-        require(holds_.fit(place_.x.size()), "what a rest holds");
+        require(engine_.holds().fit(place_.x.size()), "what a rest holds");
     }
 
     template <class Visitor>
     void visit_state(Visitor&& visit)
     {
-        if constexpr (std::remove_cvref_t<Visitor>::saves) place_ = step_.place();
+        if constexpr (std::remove_cvref_t<Visitor>::saves) place_ = now().place();
         visit(place_.t.value);
         visit(place_.t.remainder);
         visit(place_.mode);
         for (X* x : {&place_.x, &place_.remainder, &place_.rate}) visit.state(*x);
-        visit(h_next_);
-        time_events_.visit(visit);
-        holds_.visit(visit);
+        visit(h_next());
+        engine_.visit_time_event(visit);
+        engine_.holds().visit(visit);
         visit(departs_);
-        visit(ended_);
-        visit(run_.outcome);
-        this->visit_guards(visit);
-        if (defers_) {
-            visit(this->last_h_);
-            visit(newly_armed_);
-            planner_->visit(visit);
-        }
+        engine_.visit_ended(visit);
+        visit(result().outcome);
+        engine_.visit_guards(visit);
+        engine_.visit_planner(visit);
     }
 
+    bool guarded_, timed_;
+    std::conditional_t<single, Never, bool> defers_;  ///< only the loop of any number plans
+    bool backward_;
+    Engine engine_;
     std::size_t components_;  ///< number of components of the state that it was made for
     Cut<X> cut_;
     bool started_ = false;
