@@ -311,7 +311,7 @@ private:
     };
 
     /// Finds the deadlines of guards again after an exception has left them half renewed.
-    void plan_anew()
+    void plan_again()
     {
         if (!replans_) return;
         engine_.plan_again();

@@ -8,7 +8,7 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline Snapshot Loop<X, single>::save()
 {
-    plan_anew();
+    plan_again();
     Snapshot snapshot;
     snapshot.run = properties();
     visit_state(SnapshotWriter(snapshot));

@@ -322,8 +322,8 @@ bool Loop<X, single>::shorten_to_release()
             return false;
         }
     }
-    if (!engine_.ends_at()
-             .time_event) {  // a time event comes first, and holds are released after it
+    // A time event comes first, and holds are released after it.
+    if (!engine_.ends_at().time_event) {
         release_at_ = now().h();
         released_ = release.hold;
     }

@@ -406,8 +406,8 @@ private:
         const double end = clock(now().time(now().h()));
         bool found = false;
         if (planner().covers(end)) {
-            if (engine_.sample_sleeper()) return false;
             engine_.count_deferred(1);
+            if (engine_.sample_sleeper()) return false;
         } else {
             now().store(planner().steps().add().start);
             planner().overrun(end);

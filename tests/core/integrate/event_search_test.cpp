@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "clock_system.hpp"
 #include "core/event_notes.hpp"
 #include "core/event_series.hpp"
 #include "core/event_sets.hpp"
@@ -24,57 +25,14 @@
 namespace ricochet::event_search_test {
 namespace {
 
-using X = std::array<double, 1>;
+using namespace test;
+using X = Clock::State;
 using Core = detail::CoreState<X>;
 using Table = detail::GuardTable<Core, false>;
 using Search = detail::EventSearch<Core, false>;
 using Set = std::vector<std::size_t>;
 /// Roots are of order one, and located within neighbouring doubles of them.
 constexpr double rounding = 4e-16;
-
-struct Clock {
-    using State = X;
-    struct Guard {
-        std::function<double(double)> value;
-        std::function<double(double)> rate;
-        GuardInfo info{};
-    };
-    std::vector<Guard> guards;
-
-    void flow(double, const X&, X& dxdt) const { dxdt = {1}; }
-    [[nodiscard]] std::size_t guard_count() const { return guards.size(); }
-    [[nodiscard]] GuardInfo guard_info(std::size_t i) const { return guards[i].info; }
-    template <class V>
-    [[nodiscard]] double guard(std::size_t i, double, const V& x) const
-    {
-        return guards[i].value(x[0]);
-    }
-    template <class V, class D>
-    [[nodiscard]] double guard_rate(std::size_t i, double, const V& x, const D& dxdt) const
-    {
-        return guards[i].rate(x[0]) * dxdt[0];
-    }
-    void reset(std::size_t, double, X&) const {}
-};
-
-/// slope (t - root)
-Clock::Guard line(double root, double slope = -1, const GuardInfo& info = {})
-{
-    return {[=](double t) { return slope * (t - root); }, [=](double) { return slope; }, info};
-}
-/// (t - middle)² - half²: leaves its side at middle - half, and returns at middle + half.
-Clock::Guard dip(double middle, double half, const GuardInfo& info = {})
-{
-    return {[=](double t) { return (t - middle) * (t - middle) - half * half; },
-            [=](double t) { return 2 * (t - middle); }, info};
-}
-/// 1, but -1 from `from` to `to`; only its sign has a meaning.
-Clock::Guard pulse(double from, double to)
-{
-    return {[=](double t) { return t >= from && t < to ? -1.0 : 1.0; },
-            [](double) { return 0.0; },
-            {.crossing = Crossing::either, .boolean = true}};
-}
 
 /// A step of length 1 from t = 0, with all guards sampled and armed on their sides.
 class InStep {
