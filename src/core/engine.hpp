@@ -5,12 +5,16 @@
 //     apply     the resets of the fired guards: x⁻ becomes x⁺, the mode may change
 //     settle    arm every guard with the flow at x⁺; guards that a reset has carried across their
 //               surfaces are the next set, at the same instant
+//     record    the events, and the evidence that a step holds none
+//     rest      what accumulates comes to rest, and is held until the flow lifts it
 //
-// `Loop` adds a method that takes the steps; `MonitorLoop` is shown the steps of a host.
+// A loop has the engine as a member: `Loop` adds a method that takes the steps, `MonitorLoop` is
+// shown the steps of a host. The engine owns the step and the run so far, with which both work.
 #pragma once
 
 #include <algorithm>
 #include <boost/container/small_vector.hpp>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -145,10 +149,11 @@ public:
         return timed_ && time_events_.was_at(step_.start().value);
     }
 
-    /// Whether guard i belongs to the phases, not to the system.
-    [[nodiscard]] bool is_of_phases(std::size_t i) const noexcept
+    /// Names no guard of the phases as one that has ended the run.
+    void hide_guards_of_phases() noexcept
     {
-        return i >= own_guards_ && i != no_guard && i != time_event_reset;
+        if (is_of_phases(run_.guard)) run_.guard = no_guard;
+        if (is_of_phases(run_.other_guard)) run_.other_guard = no_guard;
     }
     /// The mode of the system.
     [[nodiscard]] Mode shown(Mode mode) const noexcept { return phases_ ? own_mode(mode) : mode; }
@@ -170,8 +175,6 @@ public:
 
     /// Time [s] of the next time event; infinity: there is none.
     [[nodiscard]] double time_event() const noexcept { return time_events_.next(); }
-
-    [[nodiscard]] std::uint64_t& calls() noexcept { return run_.statistics.guard_calls; }
 
     void end(Outcome outcome, std::size_t guard = no_guard) noexcept
     {
@@ -262,11 +265,6 @@ public:
         guards_.sample_values_at_end(step_, calls());
         guards_.see_series(step_);
         if (!guards_.on_series()) guards_.complete_rates(step_, calls());
-    }
-
-    [[nodiscard]] Evidence evidence_of_quiet() const noexcept
-    {
-        return on_series() ? Evidence::proved : finders_.detector.evidence;
     }
 
     void pass_on_clear() noexcept
@@ -400,7 +398,7 @@ public:
     void keep_lost() { search_.keep_lost(step_); }
 
     /// Applies the set that was found, which cuts the step short.
-    void cut_short();
+    void apply_found();
 
     /// Applies a set without guards at the start of the step: a time event, or a change that the
     /// stepper has located. `settle` deals with its consequences.
@@ -465,8 +463,6 @@ public:
     {
         return options_.record_events && (options_.event_states || system_->fixed_dimension);
     }
-
-    void add_evidence(Evidence evidence, std::uint64_t steps) noexcept;
 
     /// Brings the statistics up to date with what the step, the search and the planner have
     /// counted.
@@ -543,6 +539,14 @@ public:
     [[nodiscard]] std::uint64_t& disabled() noexcept { return search_.disabled; }
 
 private:
+    [[nodiscard]] std::uint64_t& calls() noexcept { return run_.statistics.guard_calls; }
+
+    [[nodiscard]] Evidence evidence_of_quiet() const noexcept
+    {
+        return on_series() ? Evidence::proved : finders_.detector.evidence;
+    }
+    void add_evidence(Evidence evidence, std::uint64_t steps) noexcept;
+
     // --- set-up ---
 
     /// The times at which functions may be called; a host may go on for ever.
@@ -554,6 +558,12 @@ private:
     }
 
     // --- phases ---
+
+    /// Whether guard i belongs to the phases, not to the system.
+    [[nodiscard]] bool is_of_phases(std::size_t i) const noexcept
+    {
+        return i >= own_guards_ && i != no_guard && i != time_event_reset;
+    }
 
     /// Lets the phases decide how the motion goes on after the resets of a set.
     [[gnu::noinline]] void decide(bool on_time, double t)

@@ -7,7 +7,7 @@
 namespace ricochet::detail {
 
 template <class X, bool single>
-inline void EventEngine<X, single>::cut_short()
+inline void EventEngine<X, single>::apply_found()
 {
     begin_set();
     ++run_.statistics.steps;
@@ -19,6 +19,7 @@ inline void EventEngine<X, single>::cut_short()
 template <class X, bool single>
 inline void EventEngine<X, single>::apply(bool located, bool on_time)
 {
+    assert(pending_ == Pending::nothing);
     const Instant at = located ? Instant{set_time_, set_remainder_} : step_.instant(0, 0);
     const double t = on_time ? time_event() : at.value;
     located_ = located;

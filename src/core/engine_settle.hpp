@@ -44,6 +44,7 @@ inline bool EventEngine<X, single>::settle()
     if (!holds_.empty() && release_lifted()) return true;
     if (is_due) return apply_due_time_event();
     if (!holds_.empty()) holds_.review(span_of_rest());
+    assert(search_.fired().empty() && pending_ == Pending::nothing);
     return false;
 }
 

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -209,6 +210,7 @@ public:
             return false;
         }
         settle_place(step, time_event_due);
+        assert(!fired_.empty() && at_ >= 0 && at_ <= step.h());
         return true;
     }
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -270,6 +271,7 @@ public:
 
     void arm(std::size_t i, Side side) noexcept
     {
+        assert(i < size());
         GuardRecord& record = (*this)[i];
         if (side == record.last_side && record.side == opposite(side)) record.returned = true;
         record.side = side;
@@ -387,6 +389,7 @@ public:
     /// Continues the guard from `start` inside the step, on `side`.
     void go_on_from(std::size_t i, Side side, const GuardSample& start) noexcept
     {
+        assert(start.s >= records_[i].from);
         arm(i, side);
         records_[i].next = side;
         records_[i].from = start.s;

@@ -40,7 +40,7 @@ bool Loop<X, single>::search(bool cleared)
     const double t = engine_.set_time();
     record_step_to_set(engine_.set_offset(), t);
     limit_next_step(t);
-    engine_.cut_short();
+    engine_.apply_found();
     settle_and_record();
     return true;
 }

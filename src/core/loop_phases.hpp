@@ -28,8 +28,7 @@ void Loop<X, single>::change_phase(bool has_advanced)
         }
         continue_from(x, verdict.mode, verdict.h);
     }
-    if (engine_.is_of_phases(result().guard)) result().guard = no_guard;
-    if (engine_.is_of_phases(result().other_guard)) result().other_guard = no_guard;
+    engine_.hide_guards_of_phases();
     if (ended() && phases_->reaction) result().reaction = reaction_here();
 }
 

@@ -15,6 +15,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -348,6 +349,7 @@ private:
             members_[k].increments.assign(size_of(before), {});
             note_rounding(members_[k], before);
         }
+        assert(group_.size() >= 2);
         ends_.assign(size_of(before), {});
         first_mode_ = last_mode_ = mode;
         modes_differ_ = false;

@@ -360,7 +360,7 @@ private:
     {
         if (holds_set()) {
             cut_.s = engine_.set_offset();
-            engine_.cut_short();
+            engine_.apply_found();
             return show_set();
         }
         if (ended()) {

@@ -11,6 +11,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -161,6 +162,7 @@ public:
     [[nodiscard]] std::size_t close(const Step<X>& step, Guards& guards, Statistics& counts,
                                     double h_next)
     {
+        assert(in_interval());
         meter_.review(counts);
         const std::size_t last = steps_.size() - 1;
         std::size_t doubt = none;

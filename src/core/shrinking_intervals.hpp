@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -153,6 +154,7 @@ public:
     /// last interval.
     void blame(double error) noexcept
     {
+        assert(!(error < 0));
         late_ = std::fmin(error, interval_);
         blamed_ += late_;
     }

@@ -42,6 +42,14 @@ TEST(FirstRise, ABumpBetweenNegativeEndsIsFound)
     EXPECT_NEAR(detail::first_rise(bump, 1, 1e-12).at, 0.5, 1e-11);
 }
 
+TEST(FirstRise, TheFirstOfSeveralIsFound)
+{
+    // sin(4.5 pi s) - 1/2 rises at 1/27, falls, and rises twice more up to the end, where it is
+    // 1/2.
+    const auto wave = [](double s) { return std::sin(4.5 * 3.141592653589793 * s) - 0.5; };
+    EXPECT_NEAR(detail::first_rise(wave, 1, 1e-12).at, 1.0 / 27, 1e-11);
+}
+
 TEST(FirstRise, AFunctionOfNoiseTakesABoundedNumberOfValues)
 {
     int calls = 0;

@@ -114,7 +114,7 @@ TEST(ShrinkingIntervals, AJumpBackThatFallsBelowRoundingIsLost)
     // One that began at less than a thousand roundings, has not fallen three times, or has ended
     // beyond the surface is the error of a location.
     for (const std::vector<double>& jumps : std::vector<std::vector<double>>{
-             {512, 256, 128, 64, 0.5}, {2048, 1024, 0.5}, {2048, 1024, 512, 256, -2}}) {
+             {512, 256, 128, 64, 0.5}, {4096, 2048, 1024, 0.5}, {2048, 1024, 512, 256, -2}}) {
         ShrinkingIntervals other;
         for (const double jump : jumps) EXPECT_FALSE(other.jump_is_lost(jump, 1)) << jump;
     }
