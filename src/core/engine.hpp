@@ -28,6 +28,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/cost_comparison.hpp"
 #include "core/endless_sets.hpp"
 #include "core/event_search.hpp"
 #include "core/guard_life.hpp"
@@ -35,7 +36,6 @@
 #include "core/guard_table.hpp"
 #include "core/held_components.hpp"
 #include "core/merged_resets.hpp"
-#include "core/metering.hpp"
 #include "core/planner.hpp"
 #include "core/step.hpp"
 #include "core/time_events.hpp"
@@ -81,7 +81,7 @@ public:
           defers_(defers(setup.detector, *setup.system)),
           predicts_(setup.detector.clears != nullptr),
           options_(options),
-          meter_(defers_ ? nullptr : setup.detector.metering),
+          costs_(defers_ ? nullptr : setup.detector.metering),
           resolution_(options),
           cuts_at_all_(use.cuts_at_all),
           who_(use.who),
@@ -119,9 +119,9 @@ public:
     [[nodiscard]] const HeldComponents<X, single>& holds() const noexcept { return holds_; }
     [[nodiscard]] Planner<X, single>& planner() noexcept { return *planner_; }
     [[nodiscard]] const Planner<X, single>& planner() const noexcept { return *planner_; }
-    [[nodiscard]] const MeterOfRun& meter() const noexcept
+    [[nodiscard]] const NetworkCosts& costs() const noexcept
     {
-        return defers_ ? planner_->meter() : meter_;
+        return defers_ ? planner_->costs() : costs_;
     }
     /// Approximate length [s] of the next step.
     [[nodiscard]] double& h_next() noexcept { return h_next_; }
@@ -1140,7 +1140,7 @@ private:
     bool predicts_;
     bool may_be_on_series_ = false;  ///< where the method gives guards as power series
     Options options_;
-    MeterOfRun meter_;
+    NetworkCosts costs_;
     EventResolution resolution_;
     bool cuts_at_all_;
     std::string_view who_;

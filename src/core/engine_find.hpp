@@ -14,8 +14,8 @@ inline bool EventEngine<X, single>::deserves_search(bool& cleared)
     if (predicts_ && !holds_.empty()) {
         asked_ = false;  // a network predicts the flow, and not what a rest leaves of it
     } else if (predicts_) {
-        meter_.review(run_.statistics);
-        asked_ = meter_.asks();
+        costs_.review(run_.statistics);
+        asked_ = costs_.asks();
         if (asked_) cleared = ask_network();
         if (cleared && !finders_.detector.checks_every_step) {
             ++run_.statistics.checks_deferred;
@@ -95,7 +95,7 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::ask_network()
 {
     ++run_.statistics.network_calls;
-    return meter_.time_network([&] {
+    return costs_.time_network([&] {
         return finders_.detector.clears(finders_.detecting, system_.adapter(), step_.state(),
                                         calls());
     });

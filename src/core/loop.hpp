@@ -123,7 +123,7 @@ public:
     [[nodiscard]] const Run<X>& run() const noexcept override { return engine_.run(); }
 
     /// Cost and savings of the network of a `Metered` detector so far.
-    [[nodiscard]] MeterReading meter() const override { return engine_.meter().reading(); }
+    [[nodiscard]] MeterReading meter() const override { return engine_.costs().reading(); }
 
     /// Takes one step, with any events that it holds. False: the run has ended. A detector
     /// that defers checks does not look ahead here, since every step is final.

@@ -19,10 +19,10 @@
 #include <optional>
 #include <span>
 
+#include "core/cost_comparison.hpp"
 #include "core/enclosed_intervals.hpp"
 #include "core/event_search.hpp"
 #include "core/guard_table.hpp"
-#include "core/metering.hpp"
 #include "core/tentative_steps.hpp"
 #include "core/tolerances.hpp"
 #include "ricochet/planned.hpp"
@@ -81,7 +81,7 @@ public:
           self_(finders.detecting),
           bounded_(detector_->needs_bounds),
           gated_(!bounded_ && detector_->horizon),
-          meter_(detector_->metering, guards),
+          costs_(detector_->metering, guards),
           backward_(backward),
           enclosures_(system, finders.detector, finders.detecting),
           steps_(detector_->longest, like),
@@ -106,8 +106,8 @@ public:
 
     /// Whether planning is known to cost more than it saves, so that the exact detector is to
     /// examine every step. Intervals are closed first.
-    [[nodiscard]] bool steps_aside() const noexcept { return meter_.checks() && !in_interval(); }
-    void review(const Statistics& counts) { meter_.review(counts); }
+    [[nodiscard]] bool steps_aside() const noexcept { return costs_.checks() && !in_interval(); }
+    void review(const Statistics& counts) { costs_.review(counts); }
 
     /// Plans after every guard has been armed at the start of the step, and sampled there.
     void begin(const Step<X>& step, Guards& guards)
@@ -163,7 +163,7 @@ public:
                                     double h_next)
     {
         assert(in_interval());
-        meter_.review(counts);
+        costs_.review(counts);
         const std::size_t last = steps_.size() - 1;
         std::size_t doubt = none;
         for (const std::size_t i : pending_) {
@@ -215,12 +215,12 @@ public:
             const Check end = check_of(step.time(h), step.x1());
             const double value = value_at(i, start, step.mode(), guards, counts);
             if (!(check.rate == check.rate) || check.time != start.time) {
-                check.rate = meter_.time_guard([&] {
+                check.rate = costs_.time_guard([&] {
                     return guards.rate_of(i, Guards::arrival_of(step, last_h), counts.guard_calls);
                 });
             }
             const double end_value = value_at(i, end, step.mode(), guards, counts);
-            const double rate = meter_.time_guard(
+            const double rate = costs_.time_guard(
                 [&] { return guards.rate_of(i, Guards::end_of(step), counts.guard_calls); });
             guards.wake(i, {.s = 0, .value = value, .rate = check.rate},
                         {.s = h, .value = end_value, .rate = rate});
@@ -279,7 +279,7 @@ public:
     }
 
     /// Whether asking the network saves time.
-    [[nodiscard]] const auto& meter() const noexcept { return meter_; }
+    [[nodiscard]] const auto& costs() const noexcept { return costs_; }
 
     /// The bound that a guard has violated.
     [[nodiscard]] const std::optional<WrongBound<X>>& wrong() const noexcept { return wrong_; }
@@ -405,12 +405,12 @@ private:
     [[nodiscard]] double horizon(const Check& at, Mode mode)
     {
         // Gates predict the future only, not the past.
-        if (!detector_->horizon || backward_ || !meter_.asks()) return 0;
-        const GateAnswer answer = meter_.time_network(
+        if (!detector_->horizon || backward_ || !costs_.asks()) return 0;
+        const GateAnswer answer = costs_.time_network(
             [&] { return detector_->horizon(self_, system_.adapter(), mode, at.t, *at.x); });
         ++asked_;
         outside_ += answer.outside ? 1 : 0;
-        if (answer.cleared > 0) meter_.note_cleared();
+        if (answer.cleared > 0) costs_.note_cleared();
         return answer.cleared;
     }
 
@@ -454,7 +454,7 @@ private:
         if (!detector_->level || side != Side::above) return false;
         const double slope = std::isfinite(check.slope) ? check.slope : 0;
         const double then = check.bound.distance + slope * (check.sure - check.time);
-        return meter_.asks() && !check.refused && then > detector_->lowest_level;
+        return costs_.asks() && !check.refused && then > detector_->lowest_level;
     }
 
     /// Whether a guard may tie with the end of the step, before which it has not crossed.
@@ -490,7 +490,7 @@ private:
         const LastCheck& check = checks_[i];
         if (check.exact && check.time == at.time) return check.value;
         if (check.later_time == at.time) return check.later_value;
-        return meter_.time_guard(
+        return costs_.time_guard(
             [&] { return guards.view(i, mode, counts.guard_calls).value(at.t, *at.x); });
     }
 
@@ -543,7 +543,7 @@ private:
             check.value =
                 system_->lower_bound(system_.adapter(), i, step.mode(), check.t, *check.x);
         }
-        if (detector_->level && meter_.asks()) {
+        if (detector_->level && costs_.asks()) {
             check.value = std::max(check.value, ask_level(i, check, step.mode()));
         }
         check.bound = bound(i, check, step.mode(), Side::above);
@@ -553,13 +553,13 @@ private:
     /// A lower bound of guard i from a gate; 0: none.
     [[nodiscard]] double ask_level(std::size_t i, const Check& at, Mode mode)
     {
-        const GateAnswer answer = meter_.time_network([&] {
+        const GateAnswer answer = costs_.time_network([&] {
             return detector_->level(self_, system_.adapter(), {i, mode}, at.t, *at.x);
         });
         ++asked_;
         outside_ += answer.outside ? 1 : 0;
         checks_[i].refused = !(answer.cleared > 0);
-        if (answer.cleared > 0) meter_.note_cleared();
+        if (answer.cleared > 0) costs_.note_cleared();
         return answer.cleared;
     }
 
@@ -643,7 +643,7 @@ private:
     const void* self_;
     bool bounded_;  ///< defers by declared bounds
     bool gated_;    ///< defers only by what a gate clears
-    MeterOfRun meter_;
+    NetworkCosts costs_;
     bool backward_;
     Enclosures<X> enclosures_;
     Steps steps_;

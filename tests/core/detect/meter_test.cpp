@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "clearing_gate.hpp"
+#include "core/cost_comparison.hpp"
 #include "ricochet/integrate.hpp"
 #include "ricochet/learn/certify.hpp"
 
@@ -326,7 +327,7 @@ TEST(Metered, PlanningIsLeftWhereItCostsMoreThanItSaves)
     const MeterOptions options = counted(1e-7, 1e-6);
     // Calls of the guard per step: one if every step is checked; ten, or a tenth, if planned.
     for (const double planned : {10.0, 0.1}) {
-        detail::Meter meter(options, 1);
+        detail::CostComparison meter(options, 1);
         Statistics counts;
         double calls = 0;
         std::uint64_t checked = 0;

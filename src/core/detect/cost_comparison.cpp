@@ -1,4 +1,4 @@
-#include "ricochet/detail/meter.hpp"
+#include "core/cost_comparison.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -30,7 +30,7 @@ constexpr double first_answers = 16;
 
 }  // namespace
 
-double Meter::seconds() noexcept
+double CostComparison::seconds() noexcept
 {
     using Clock = std::chrono::steady_clock;
     return std::chrono::duration<double>(Clock::now().time_since_epoch()).count();
@@ -49,7 +49,7 @@ void validate(const MeterOptions& options)
     require(options.piece > 0, "piece must be at least 1 step", 0);
 }
 
-void Meter::Account::add(double more_steps, double more_cost) noexcept
+void CostComparison::Account::add(double more_steps, double more_cost) noexcept
 {
     const double aside = pieces > 0 ? more_cost - mean() * more_steps : 0;
     steps = memory * steps + more_steps;
@@ -58,14 +58,14 @@ void Meter::Account::add(double more_steps, double more_cost) noexcept
     ++pieces;
 }
 
-Meter::Meter(const MeterOptions& options, std::size_t planned_guards)
+CostComparison::CostComparison(const MeterOptions& options, std::size_t planned_guards)
     : options_((validate(options), options)),
       planned_guards_(static_cast<double>(planned_guards)),
       decides_(options.decision == MeterOptions::Decision::measured ||
                options.decision == MeterOptions::Decision::counted),
       samples_(options.decision != MeterOptions::Decision::counted),
-      best_(first_way()),
-      way_(best_),
+      best_(first_alternative()),
+      current_(best_),
       next_steps_(options.piece)
 {
     if (!samples_) {
@@ -77,61 +77,61 @@ Meter::Meter(const MeterOptions& options, std::size_t planned_guards)
     if (decides_ && samples_) began_ = seconds();
 }
 
-Meter::Way Meter::first_way() const noexcept
+CostComparison::Alternative CostComparison::first_alternative() const noexcept
 {
     using Decision = MeterOptions::Decision;
     if (options_.decision == Decision::always) return ask;
     return planned_guards_ > 0 && options_.decision != Decision::every_step ? plan : check;
 }
 
-bool Meter::has_way(Way way) const noexcept
+bool CostComparison::has(Alternative which) const noexcept
 {
-    return way != plan || planned_guards_ > 0;
+    return which != plan || planned_guards_ > 0;
 }
 
-SampledCost& Meter::step_of(Way way) noexcept
+SampledCost& CostComparison::step_of(Alternative which) noexcept
 {
-    return way == check || planned_guards_ == 0 ? checked_step_ : planned_step_;
+    return which == check || planned_guards_ == 0 ? checked_step_ : planned_step_;
 }
 
 /// Cost of a step. While it is not known without planning, a fraction of the cost with planning.
-double Meter::step_cost(Way way) const noexcept
+double CostComparison::step_cost(Alternative which) const noexcept
 {
-    if (way != check && planned_guards_ > 0) return planned_step_.value();
+    if (which != check && planned_guards_ > 0) return planned_step_.value();
     const double known = checked_step_.value();
     return known > 0 ? known : least_step * planned_step_.value();
 }
 
-double Meter::cost_of(const Counts& piece) const noexcept
+double CostComparison::cost_of(const Counts& piece) const noexcept
 {
     return piece.checks * guard_.value() + piece.asked * network_.value() +
-           piece.work * step_cost(way_);
+           piece.work * step_cost(current_);
 }
 
-double Meter::allowance(Way way) const noexcept
+double CostComparison::allowance(Alternative which) const noexcept
 {
     const double share = options_.trials * total_ - spent_;
-    if (way == ask) return share + first_answers * network_.value();
-    const bool known = way != check || of(way).pieces >= fewest;
+    if (which == ask) return share + first_answers * network_.value();
+    const bool known = which != check || of(which).pieces >= fewest;
     const double piece = of(best_).mean() * static_cast<double>(options_.piece);
     return known ? share : std::max(share, 0.0) + first_excess * piece;
 }
 
 /// Whether a trial is allowed: once the cost of a useless piece is known, the budget must cover it.
-bool Meter::may_try(Way way) const noexcept
+bool CostComparison::may_try(Alternative which) const noexcept
 {
-    const Account& account = of(way);
-    if (way == check && account.pieces == 0) {
+    const Account& account = of(which);
+    if (which == check && account.pieces == 0) {
         // The first pieces, before anything is in a cache, are not representative.
-        const double least = planned_guards_ * guard_.value() + step_cost(way);
+        const double least = planned_guards_ * guard_.value() + step_cost(which);
         return of(best_).pieces >= fewest && least < of(best_).mean();
     }
     if (account.pieces == 0) return true;
     const double excess = account.mean() - of(best_).mean();
-    return allowance(way) > std::max(excess, 0.0) * static_cast<double>(options_.piece);
+    return allowance(which) > std::max(excess, 0.0) * static_cast<double>(options_.piece);
 }
 
-void Meter::consider(const Statistics& counts)
+void CostComparison::consider(const Statistics& counts)
 {
     const Counts now{.steps = static_cast<double>(counts.steps),
                      .work = static_cast<double>(counts.steps + counts.repeated_steps),
@@ -145,7 +145,7 @@ void Meter::consider(const Statistics& counts)
     if (counts.steps < next_steps_) {
         // A trial that has become too expensive ends early.
         const double excess = cost_of(piece) - of(best_).mean() * std::max(piece.steps, 0.0);
-        if (excess <= allowance(way_) && asked_ < most_asked_) return;
+        if (excess <= allowance(current_) && asked_ < most_asked_) return;
     }
     if (samples_) sample_step(piece);
     close_piece(piece, cost_of(piece));
@@ -155,83 +155,85 @@ void Meter::consider(const Statistics& counts)
 }
 
 /// Adds the time of a piece per step, without its guard calls and inferences.
-void Meter::sample_step(const Counts& piece)
+void CostComparison::sample_step(const Counts& piece)
 {
     const double now = seconds();
     const double spent = now - began_;
     began_ = now;
     const double rest = spent - piece.checks * guard_.value() - piece.asked * network_.value();
     const double enough = 0.25 * static_cast<double>(options_.piece);
-    if (piece.work >= enough) step_of(way_).add(std::max(rest, 0.0) / piece.work);
+    if (piece.work >= enough) step_of(current_).add(std::max(rest, 0.0) / piece.work);
 }
 
-void Meter::close_piece(const Counts& piece, double cost)
+void CostComparison::close_piece(const Counts& piece, double cost)
 {
     total_ += cost;
-    if (way_ != best_) {
+    if (current_ != best_) {
         spent_ = std::max(spent_ + cost - of(best_).mean() * std::max(piece.steps, 0.0), 0.0);
     }
     // A trial that did not advance the run still has its cost.
-    of(way_).add(std::max(piece.steps, 1.0), cost);
+    of(current_).add(std::max(piece.steps, 1.0), cost);
 }
 
 /// Uncertainty of the difference of two means. Few pieces determine the spread of pieces badly.
-double Meter::noise_between(Way a, Way b) const noexcept
+double CostComparison::noise_between(Alternative a, Alternative b) const noexcept
 {
     const auto pieces = static_cast<double>(std::min(of(a).pieces, of(b).pieces));
     return (1 + unsure / pieces) * std::hypot(of(a).error(), of(b).error());
 }
 
 /// The cheapest alternative with enough pieces. Asking has to be better beyond doubt.
-Meter::Way Meter::find_best() const noexcept
+CostComparison::Alternative CostComparison::find_best() const noexcept
 {
-    Way best = best_;
+    Alternative best = best_;
     if (of(best).pieces < fewest) return best;
-    for (const Way way : all_ways) {
-        if (way == best || of(way).pieces < fewest) continue;
-        const double noise = noise_between(way, best);
-        const double doubt = best == ask || way != ask ? 0 : 2 * noise;
-        if (of(best).mean() - of(way).mean() > doubt) best = way;
+    for (const Alternative which : alternatives) {
+        if (which == best || of(which).pieces < fewest) continue;
+        const double noise = noise_between(which, best);
+        const double doubt = best == ask || which != ask ? 0 : 2 * noise;
+        if (of(best).mean() - of(which).mean() > doubt) best = which;
     }
     return best;
 }
 
 /// The best alternative, or another one if its turn has come.
-Meter::Way Meter::next_way() noexcept
+CostComparison::Alternative CostComparison::next_alternative() noexcept
 {
-    Way next = best_;
-    for (const Way way : all_ways) {
-        if (way == best_ || !has_way(way)) continue;
-        Account& account = of(way);
+    Alternative next = best_;
+    for (const Alternative which : alternatives) {
+        if (which == best_ || !has(which)) continue;
+        Account& account = of(which);
         const bool due = ++account.waited > account.wait;
-        if (due && next == best_ && may_try(way)) next = way;
+        if (due && next == best_ && may_try(which)) next = which;
     }
     if (next != best_) of(next).waited = 0;
     return next;
 }
 
-void Meter::choose_next()
+void CostComparison::choose_next()
 {
-    const Way best = find_best();
+    const Alternative best = find_best();
     if (best != best_) {
         for (Account& account : accounts_) account.wait = 1;
-    } else if (way_ != best_ && of(way_).pieces >= fewest && of(best_).pieces >= fewest) {
-        of(way_).wait = std::min(2 * of(way_).wait, longest_wait);
+    } else if (current_ != best_ && of(current_).pieces >= fewest && of(best_).pieces >= fewest) {
+        of(current_).wait = std::min(2 * of(current_).wait, longest_wait);
     }
     best_ = best;
-    way_ = next_way();
+    current_ = next_alternative();
     most_asked_ = std::numeric_limits<std::uint64_t>::max();
-    if (way_ == ask && best_ != ask) {
+    if (current_ == ask && best_ != ask) {
         const double answer = network_.value();
         const double most = answer > 0 ? allowance(ask) / answer : first_answers;
         if (most < 1e9) most_asked_ = asked_ + static_cast<std::uint64_t>(std::max(most, 1.0));
     }
 }
 
-MeterReading Meter::reading() const noexcept
+MeterReading CostComparison::reading() const noexcept
 {
-    const auto mean = [this](Way way) { return of(way).pieces > 0 ? of(way).mean() : 0; };
-    const Way base = best_ != ask ? best_ : planned_guards_ > 0 ? plan : check;
+    const auto mean = [this](Alternative which) {
+        return of(which).pieces > 0 ? of(which).mean() : 0;
+    };
+    const Alternative base = best_ != ask ? best_ : planned_guards_ > 0 ? plan : check;
     return {.guard = guard_.value(),
             .network = network_.value(),
             .step = step_cost(best_),
