@@ -97,8 +97,9 @@ public:
           holds_(system_, step_, guards_, run_.statistics.guard_calls, backward_)
     {
         const Screening screening = setup.detector.screening;
-        may_be_on_series_ = !defers_ && !predicts_ &&
-                            (screening == Screening::extremum || screening == Screening::every);
+        guards_.await_series(
+            step_, !defers_ && !predicts_ &&
+                       (screening == Screening::extremum || screening == Screening::every));
         cuts_before_windows_ = !single && use.repeats_steps && options.event_window > 0 && !defers_;
         if (defers_) planner_.emplace(system_, finders_, x0, backward_, guards_.size());
     }
@@ -305,17 +306,14 @@ public:
     // --- quiet runs ---
 
     /// Whether guards are power series over each step.
-    [[nodiscard]] bool on_series() const noexcept
-    {
-        return may_be_on_series_ && step_.has_guard_series();
-    }
-    void lend(QuietRun& quiet) const noexcept
+    [[nodiscard]] bool on_series() const noexcept { return guards_.expects_series(); }
+    [[gnu::always_inline]] void lend(QuietRun& quiet) const noexcept
     {
         quiet.checks_inside = guards_.checks_inside() && options_.check_inside && !on_series();
         guards_.lend(quiet, step_.time(0));
     }
     /// Takes the guard, the counts and the length of the next step over from a quiet run.
-    void take_back(const QuietRun& quiet);
+    [[gnu::always_inline]] void take_back(const QuietRun& quiet);
 
     // --- deferred checks ---
 
@@ -1138,7 +1136,6 @@ private:
     bool timed_;
     std::conditional_t<single, Never, bool> defers_;  ///< only the loop of any number plans
     bool predicts_;
-    bool may_be_on_series_ = false;  ///< where the method gives guards as power series
     Options options_;
     NetworkCosts costs_;
     EventResolution resolution_;

@@ -206,8 +206,19 @@ public:
         if (!this->series_converge(step.h())) this->see({}, false);
     }
 
-    /// The guards are not power series any more.
-    void leave_series() { this->see({}, false); }
+    /// The guards are power series over each step from here on, where the step gives them and the
+    /// detector `may_use_series`; not yet over the current one.
+    void await_series(const Step<X>& step)
+    {
+        this->see({}, false);
+        expects_series_ = may_use_series_ && step.has_guard_series();
+    }
+    void await_series(const Step<X>& step, bool may_use_series)
+    {
+        may_use_series_ = may_use_series;
+        await_series(step);
+    }
+    [[nodiscard]] bool expects_series() const noexcept { return expects_series_; }
 
     /// Part of the step that has not been examined for guard i; `end` is the sample at its end.
     [[nodiscard]] Watch watch(std::size_t i, const Step<X>& step, const GuardSample& end) const
@@ -593,6 +604,7 @@ private:
     }
 
     bool rates_left_out_ = false;  ///< at the end of the current step
+    bool may_use_series_ = false, expects_series_ = false;
     double armed_at_ = std::numeric_limits<double>::quiet_NaN();  ///< [s]
     Doubles sizes_{};
     Doubles armed_g_{};

@@ -387,7 +387,7 @@ void HeldComponents<X, single>::renew()
     std::sort(components.begin(), components.end());
     components.erase(std::unique(components.begin(), components.end()), components.end());
     step_.hold_components({components.data(), components.size()});
-    guards_.leave_series();
+    guards_.await_series(step_);
     changed_ = 2;
 }
 

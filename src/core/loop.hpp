@@ -350,7 +350,7 @@ private:
 
     /// Takes steps until one needs a check, and handles it. False: no step did. After an exception
     /// the run returns to the start of the quiet run.
-    bool run_quietly();
+    [[gnu::always_inline]] bool run_quietly();
     [[gnu::noinline]] bool run_quietly_resumably();
     [[gnu::always_inline]] bool run_quietly_from_here();
     /// Limits and settings for the quiet steps from here on.

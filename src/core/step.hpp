@@ -72,7 +72,7 @@ public:
     [[nodiscard]] bool backward() const noexcept { return state_.backward; }
 
     /// The time at offset s + `remainder`.
-    [[nodiscard]] Instant instant(double s, double remainder) const noexcept
+    [[nodiscard, gnu::always_inline]] Instant instant(double s, double remainder) const noexcept
     {
         if (s == pinned_h_)
             return Instant{pinned_t_, 0}.after(state_.in_time(std::min(remainder, 0.0)));
