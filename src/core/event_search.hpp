@@ -965,9 +965,8 @@ private:
     /// The longest time [s] after which a guard of the set that has not left its side at the state
     /// x reaches its surface there, at the offset `at`; 0 if there is none, NaN if it cannot be
     /// told.
-    [[nodiscard, gnu::always_inline]] double lacks(const CurrentStep& step, Guards& guards,
-                                                   const X& x, const TwoSum& at,
-                                                   std::uint64_t& calls);
+    [[nodiscard]] double lacks(const CurrentStep& step, Guards& guards, const X& x,
+                               const TwoSum& at, std::uint64_t& calls);
 
     /// Whether every guard of the set has left its side at the state `space_.root`, which is
     /// `ahead` [s] behind the set; the set is moved there if so.

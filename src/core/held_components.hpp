@@ -101,8 +101,7 @@ public:
         double bend = 0;              ///< as in `Rise`
     };
     /// @param state_at  called as state_at(s, x), writes the state at offset s into x
-    template <class StateAt>
-    [[nodiscard]] Release first_release(double length, const StateAt& state_at);
+    [[nodiscard]] Release first_release(double length, FunctionRef<void(double, X&)> state_at);
 
     /// The guard of a hold that has left its surface; `no_guard`: none has.
     [[nodiscard]] std::size_t guard_left_at(double t, const X& x);
@@ -165,9 +164,9 @@ private:
         bool frozen;   ///< the flow is that at t
     };
 
+    using Flow = FunctionRef<void(double, const X&, X&)>;
     /// Change of a guard along `flow(t, x, dxdt)`, by Heun's step.
-    template <class Flow>
-    [[nodiscard]] double drift(const Following& by, const Flow& flow);
+    [[nodiscard]] double drift(const Following& by, Flow flow);
     /// The same along the flow in which nothing is held.
     [[nodiscard]] double free_drift(const Following& by);
 
@@ -220,8 +219,7 @@ private:
 };
 
 template <class X, bool single>
-template <class Flow>
-double HeldComponents<X, single>::drift(const Following& by, const Flow& flow)
+double HeldComponents<X, single>::drift(const Following& by, Flow flow)
 {
     const X& x = *by.x;
     X rate = x, later = x, rate_later = x;
@@ -434,8 +432,8 @@ std::size_t HeldComponents<X, single>::lifted()
 }
 
 template <class X, bool single>
-template <class StateAt>
-auto HeldComponents<X, single>::first_release(double length, const StateAt& state_at) -> Release
+auto HeldComponents<X, single>::first_release(double length, FunctionRef<void(double, X&)> state_at)
+    -> Release
 {
     Release first{.at = length};
     X x = step_.x0();
