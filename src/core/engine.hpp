@@ -375,13 +375,14 @@ public:
         if (planner_->wrong()) name_wrong_bound();
         return ended_;
     }
-    /// Plans again after an exception has left the deadlines half renewed.
+    /// Finds the deadlines of guards again after an exception has left them half renewed.
     void plan_again()
     {
+        if (!replans_) return;
         guards_.wake_all(step_, last_h_, calls(), newly_armed_);
         newly_armed_ = true;
+        replans_ = false;
     }
-    void watch_no_more() noexcept { watching_ = false; }
 
     // --- apply ---
 
@@ -398,14 +399,6 @@ public:
     /// Applies the set that was found, which cuts the step short.
     void apply_found();
 
-    /// Applies a set without guards at the start of the step: a time event, or a change that the
-    /// stepper has located. `settle` deals with its consequences.
-    /// @param taken  as in `leave_from_start`
-    void apply_without_guards(bool on_time, double taken = 0)
-    {
-        begin_set();
-        apply_at_start(on_time, taken);
-    }
     /// Applies a time event at the start of the step.
     void apply_time_event() { apply_without_guards(true); }
     /// Applies what the accepted step has ended at. @param taken  as in `leave_from_start`
@@ -462,29 +455,9 @@ public:
         return options_.record_events && (options_.event_states || system_->fixed_dimension);
     }
 
-    /// Brings the statistics up to date with what the step, the search and the planner have
-    /// counted.
-    void collect_counts() noexcept
-    {
-        run_.statistics.flow_calls = step_.flow_calls();
-        run_.statistics.resteps = step_.resteps();
-        if (defers_) planner_->add_counts(run_.statistics);
-        run_.statistics.disabled += std::exchange(search_.disabled, 0);
-    }
-
-    /// Lists the guards that were armed beyond their surfaces.
-    void list_armed_beyond()
-    {
-        run_.armed_beyond.clear();
-        run_.armed_on_surface.clear();
-        for (std::size_t i = 0; i < std::min(guards_.size(), own_guards_); ++i) {
-            if (std::as_const(guards_)[i].armed_on) note_left_start(i);
-            const GuardRecord& record = std::as_const(guards_)[i];
-            if (!record.armed_beyond) continue;
-            run_.armed_beyond.push_back(i);
-            if (record.armed_on) run_.armed_on_surface.push_back(i);
-        }
-    }
+    /// Brings the counts up to date with those of the step, the search and the planner, and lists
+    /// the guards that were armed beyond their surfaces.
+    void bring_up_to_date();
 
     /// Takes back a recorded event of guard i.
     void forget_event(std::size_t i) noexcept { --guards_[i].events; }
@@ -532,7 +505,8 @@ public:
     void put_back(const Checkpoint& at);
     /// Forgets what was being done where an exception has come from.
     /// @param newly_armed  as it was at the start of the step
-    void forget_exception(bool newly_armed);
+    /// @param planned      guards were left alone until their deadlines
+    void forget_exception(bool newly_armed, bool planned);
     /// Events that were rejected in searches, and are not yet counted.
     [[nodiscard]] std::uint64_t& disabled() noexcept { return search_.disabled; }
 
@@ -608,6 +582,14 @@ private:
     /// Applies a time event that is due at the start of the step, after others of this instant.
     [[nodiscard]] bool apply_due_time_event();
 
+    /// Applies a set without guards at the start of the step: a time event, or a change that the
+    /// stepper has located. `settle` deals with its consequences.
+    /// @param taken  as in `leave_from_start`
+    void apply_without_guards(bool on_time, double taken = 0)
+    {
+        begin_set();
+        apply_at_start(on_time, taken);
+    }
     /// Begins the first set of an instant.
     void begin_set() noexcept
     {
@@ -1150,6 +1132,7 @@ private:
     double last_h_ = 0;        ///< [s] the previous step, or the scale at which guards were armed
     bool newly_armed_ = true;  ///< all guards are sampled at the start of the step, none is planned
     bool watching_ = false;    ///< rates are sampled too, since every step is checked
+    bool replans_ = false;     ///< all deadlines of guards have to be found again
     End ends_at_;
     bool on_change_ = false;    ///< the current set lies there
     bool cuts_before_windows_;  ///< `EngineUse::repeats_steps`, and there are windows

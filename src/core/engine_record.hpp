@@ -335,6 +335,24 @@ inline void EventEngine<X, single>::record_notes(double s)
 }
 
 template <class X, bool single>
+inline void EventEngine<X, single>::bring_up_to_date()
+{
+    run_.statistics.flow_calls = step_.flow_calls();
+    run_.statistics.resteps = step_.resteps();
+    if (defers_) planner_->add_counts(run_.statistics);
+    run_.statistics.disabled += std::exchange(search_.disabled, 0);
+    run_.armed_beyond.clear();
+    run_.armed_on_surface.clear();
+    for (std::size_t i = 0; i < std::min(guards_.size(), own_guards_); ++i) {
+        if (std::as_const(guards_)[i].armed_on) note_left_start(i);
+        const GuardRecord& record = std::as_const(guards_)[i];
+        if (!record.armed_beyond) continue;
+        run_.armed_beyond.push_back(i);
+        if (record.armed_on) run_.armed_on_surface.push_back(i);
+    }
+}
+
+template <class X, bool single>
 inline void EventEngine<X, single>::add_evidence(Evidence evidence, std::uint64_t steps) noexcept
 {
     EvidenceCounts& counts = run_.statistics.evidence;

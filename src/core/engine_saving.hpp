@@ -9,7 +9,7 @@ template <class X, bool single>
 void EventEngine<X, single>::forget_run()
 {
     reopen();
-    stops_ = on_change_ = false;
+    stops_ = on_change_ = replans_ = false;
     ends_at_ = {};
     forget_cause();
     holds_.forget();
@@ -28,7 +28,7 @@ void EventEngine<X, single>::go_on_from(const StepStart<X>& place)
 {
     holds_.resume();
     step_.restart(place);
-    watching_ = on_change_ = false;
+    watching_ = on_change_ = replans_ = false;
     ends_at_ = {};
     time_events_.forget_here();
     pending_ = Pending::nothing;
@@ -63,8 +63,12 @@ void EventEngine<X, single>::put_back(const Checkpoint& at)
 }
 
 template <class X, bool single>
-void EventEngine<X, single>::forget_exception(bool newly_armed)
+void EventEngine<X, single>::forget_exception(bool newly_armed, bool planned)
 {
+    if (planned) {
+        replans_ = true;
+        watching_ = false;
+    }
     reopen();
     forget_cause();
     newly_armed_ = newly_armed;

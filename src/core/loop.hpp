@@ -310,14 +310,6 @@ private:
         typename Engine::Checkpoint at;
     };
 
-    /// Finds the deadlines of guards again after an exception has left them half renewed.
-    void plan_again()
-    {
-        if (!replans_) return;
-        engine_.plan_again();
-        replans_ = false;
-    }
-
     void mark_step() noexcept;
     void mark_phases();
     /// Keeps the state of the guards before events change it.
@@ -726,7 +718,6 @@ private:
     ShownStep shown_step_;
     StepStart<X> place_;
     std::unique_ptr<Mark> mark_;  ///< null: the run does not continue after an exception
-    bool replans_ = false;        ///< all deadlines of guards have to be found again
 };
 
 }  // namespace ricochet::detail

@@ -24,7 +24,7 @@ inline void Loop<X, single>::check_all()
 template <class X, bool single>
 inline void Loop<X, single>::advance_by_plan(double remaining, const Advance& how)
 {
-    plan_again();
+    engine_.plan_again();
     if (planner().steps_aside()) return advance_with_check(remaining);
     if (engine_.newly_armed()) engine_.begin_plan();
     const double proposed = h_next();

@@ -51,7 +51,6 @@ void Loop<X, single>::show_from_restart(double t, std::ptrdiff_t recorded, std::
 template <class X, bool single>
 void Loop<X, single>::start_at(double t, const X& x, Mode mode)
 {
-    replans_ = false;
     engine_.forget_run();
     if (phases_) {
         X start = x;

@@ -139,14 +139,9 @@ void Loop<X, single>::go_back_to_mark()
         planner().steps().clear();
         planner().forget_wrong();
     }
-    if (mark.planned) {
-        // Deadlines may be half renewed: they are found again at the start of the step.
-        replans_ = true;
-        engine_.watch_no_more();
-    }
     rewind_counts(mark, steps, rejected);
     cut_records(mark, samples, pieces);
-    engine_.forget_exception(mark.newly_armed);
+    engine_.forget_exception(mark.newly_armed, mark.planned);
 }
 
 }  // namespace ricochet::detail

@@ -8,7 +8,7 @@ namespace ricochet::detail {
 template <class X, bool single>
 inline Snapshot Loop<X, single>::save()
 {
-    plan_again();
+    engine_.plan_again();
     Snapshot snapshot;
     snapshot.run = properties();
     visit_state(SnapshotWriter(snapshot));
@@ -45,7 +45,6 @@ inline void Loop<X, single>::go_on_from_place()
 {
     engine_.go_on_from(place_);
     next_review_ = 0;
-    replans_ = false;
 }
 
 template <class X, bool single>

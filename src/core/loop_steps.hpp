@@ -81,8 +81,7 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
     result().t = now().start().value;
     result().x = now().x0();
     result().mode = engine_.shown(now().mode());
-    engine_.collect_counts();
-    engine_.list_armed_beyond();
+    engine_.bring_up_to_date();
     if (phases_ && phases_->complete) phases_->complete(system().adapter(), result());
     if (ended()) {
         if (next_sample_ < options().sample_times.size()) emit_last_samples();

@@ -176,8 +176,7 @@ public:
     }
     [[nodiscard]] const Run<X>& run() noexcept override
     {
-        engine_.collect_counts();
-        engine_.list_armed_beyond();
+        engine_.bring_up_to_date();
         return result();
     }
     void clear_events() noexcept override { result().events.clear(); }

@@ -151,7 +151,7 @@ TEST(EventEngine, WhatItKeepsIsPutBackAfterAnEvent)
         if (k == 0) first = loop.engine.set_time();
         EXPECT_EQ(loop.engine.set_time(), first);
         loop.engine.put_back(kept);
-        loop.engine.forget_exception(false);
+        loop.engine.forget_exception(false, false);
         EXPECT_EQ(loop.engine.step().start().value, 0.75);
         EXPECT_EQ(loop.engine.step().x0()[0], height);
         EXPECT_EQ(loop.engine.guards()[0].events, 0U);
