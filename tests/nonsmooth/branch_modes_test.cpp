@@ -1,45 +1,25 @@
-// The branches of an inclusion as modes, and the check that a step followed the held reactions, by
-// themselves: a block of 1 kg that is pulled by a load and rubs with friction 1 N,
-//
-//     v' = load(t) + r,   r in [-1, 1] against v,
-//
-// and two such blocks, of which one rubs on the other.
+// The branches of an inclusion as modes, by themselves: of a block that rubs on the ground, and of
+// two such blocks, of which one rubs on the other.
 
 #include "ricochet/nonsmooth/branch_modes.hpp"
 
 #include <gtest/gtest.h>
 
 #include <array>
-#include <cmath>
-#include <functional>
 
-#include "ricochet/nonsmooth/detail/held_reactions.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
+#include "rubbing_block.hpp"
 
 namespace ricochet {
 namespace {
 
 using Modes = detail::AnyModes<1, 1>;
-using Vector1 = Eigen::Matrix<double, 1, 1>;
+using test::Block;
+using test::pulled_by;
+using Vector1 = Block::Vector;
 constexpr Mode forwards = 0, held = 1, backwards = 2;  // y > 0, y = 0, y < 0
 constexpr std::size_t falls = 0, rises = 1, at_lower = 2, at_upper = 3, is_set = 4;
 
-struct Block {
-    static constexpr int state_size = 1;
-    static constexpr int reaction_size = 1;
-    std::function<double(double)> load = [](double) { return 0.0; };
-
-    void smooth(double t, const Vector1& /*w*/, Vector1& f) const { f[0] = load(t); }
-    [[nodiscard]] static sets::IntervalSet reaction_set(double /*t*/, const Vector1& /*w*/)
-    {
-        return sets::IntervalSet::symmetric(1);
-    }
-};
-
-Block pulled_by(double load)
-{
-    return {[=](double) { return load; }};
-}
 Mode start(const Block& block, double v)
 {
     Vector1 w(v);
@@ -173,50 +153,6 @@ TEST(BranchModes, ReactionsThatDependOnEachOtherAreHeldTogether)
     const Mode upper = pulled.mode_at(0, w);
     EXPECT_EQ(upper, held + 3 * forwards);
     EXPECT_DOUBLE_EQ(pulled.reaction(upper, 0, w)[0], -1);
-}
-
-// --- held reactions ---
-
-/// The fraction of a step from t0 to t1, in which the block stands, that would follow its reaction.
-double fraction_of(const Modes& modes, detail::HeldReactions<1, 1>& reactions, double t0, double t1)
-{
-    const Vector1 w(0.0);
-    Modes::Motion motion;
-    Modes::Rooms rooms;
-    modes.rooms(held, t1, w, motion, rooms);
-    return reactions.fraction(modes, {held, t0, t1, w, w, 0}, motion.rate, rooms);
-}
-double fraction_of(const Block& block, double t0, double t1)
-{
-    const BranchModes<Block> modes(block);
-    detail::HeldReactions<1, 1> reactions;
-    return fraction_of(modes, reactions, t0, t1);
-}
-
-TEST(HeldReactions, AReactionInsideItsBoundsIsFollowed)
-{
-    EXPECT_EQ(fraction_of(pulled_by(0.9), 0, 100), 1);
-    EXPECT_EQ(fraction_of({[](double t) { return 0.9 * t; }}, 0, 1), 1);
-}
-
-TEST(HeldReactions, AnExcursionBeyondTheBoundIsSeenFromInside)
-{
-    // The load is 0.5 at both ends and 1.5 between them.
-    const auto bump = [](double t) { return 0.5 + std::sin(3.141592653589793 * t); };
-    EXPECT_LT(fraction_of({bump}, 0, 1), 1);
-    // Steps that the fraction shortens end before the bound is passed, at asin(0.5) / pi = 1/6.
-    double h = 1;
-    for (double part = 0; (part = fraction_of({bump}, 0, h)) < 1;) h *= part;
-    EXPECT_LT(h, 1.0 / 6);
-    EXPECT_GT(h, 1.0 / 60);  // a fraction is at least a tenth of what follows the reaction
-}
-
-TEST(HeldReactions, OneThatStartsBeyondItsBoundIsNamed)
-{
-    const BranchModes<Block> modes(pulled_by(1.25));
-    detail::HeldReactions<1, 1> reactions;
-    (void)fraction_of(modes, reactions, 0, 1);
-    EXPECT_TRUE(reactions.starts_beyond());
 }
 
 }  // namespace
