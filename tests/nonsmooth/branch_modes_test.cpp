@@ -155,5 +155,39 @@ TEST(BranchModes, ReactionsThatDependOnEachOtherAreHeldTogether)
     EXPECT_DOUBLE_EQ(pulled.reaction(upper, 0, w)[0], -1);
 }
 
+TEST(BranchModes, AllGuardsTogetherAreThoseOneByOne)
+{
+    using Pair = detail::AnyModes<4, 2>;
+    const BranchModes<TwoBlocks> modes(TwoBlocks{.pull = 0.5});
+    const Pair::State x{0, 0, 2, 1}, rate{2, 1, -0.25, 0.75};
+    for (Mode mode = 0; mode < Pair::branch_modes; ++mode) {
+        std::array<double, Pair::guard_count> all{}, rates{};
+        modes.guards(mode, 0, x, all);
+        modes.guard_rates(mode, 0, x, rate, rates);
+        for (std::size_t i = 0; i < Pair::guard_count; ++i) {
+            if (!modes.enabled(i, mode)) continue;
+            EXPECT_EQ(all[i], modes.guard(i, mode, 0, x)) << mode << ' ' << i;
+            EXPECT_EQ(rates[i], modes.guard_rate(i, mode, 0, x, rate)) << mode << ' ' << i;
+        }
+        EXPECT_EQ(Pair::mode_of(Pair::branches_of(mode)), mode);
+    }
+}
+
+TEST(BranchModes, AnArrivalWhereAnotherOneLeavesItsBoundIsNotDecided)
+{
+    using Pair = detail::AnyModes<4, 2>;
+    const BranchModes<TwoBlocks> modes(TwoBlocks{.pull = 1.5});
+    const Mode mode = held + 3 * forwards;  // the lower block stands, the upper one slides
+    constexpr std::size_t upper_falls = 4 + falls;
+    Pair::State x{0, 0, 0, 1e-17};
+    const std::size_t leaves[] = {at_lower}, arrives[] = {upper_falls},
+                      both[] = {at_lower, upper_falls};
+    EXPECT_EQ(modes.reset(FiredGuards(both, false), mode, 0, x), Pair::several);
+    x = {0, 0, 0, 1};
+    EXPECT_EQ(modes.reset(FiredGuards(leaves, false), mode, 0, x), forwards + 3 * forwards);
+    x = {0, 0, 0, 1e-17};
+    EXPECT_NE(modes.reset(FiredGuards(arrives, false), mode, 0, x), Pair::several);
+}
+
 }  // namespace
 }  // namespace ricochet
