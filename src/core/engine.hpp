@@ -346,7 +346,7 @@ public:
 
     /// Whether one of the guards in doubt needs a search in the current step. Those that their
     /// bounds clear on a division of the step are not in doubt any more.
-    [[nodiscard]] bool judges_suspicious();
+    [[nodiscard]] bool doubts_remain();
 
     /// As `Planner::close`, for the current step.
     [[nodiscard]] std::size_t close_interval()

@@ -288,7 +288,7 @@ inline bool EventEngine<X, single>::bounds_show_event()
 }
 
 template <class X, bool single>
-inline bool EventEngine<X, single>::judges_suspicious()
+inline bool EventEngine<X, single>::doubts_remain()
 {
     search_.cover().begin();
     guards_.forget_dips();

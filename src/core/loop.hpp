@@ -454,7 +454,7 @@ private:
     void close_interval();
 
     /// Lets the exact detector examine the current step, for the guards in doubt.
-    void judge();
+    void verify();
 
     /// Rolls the whole interval back without a check, and continues step by step.
     void take_back()

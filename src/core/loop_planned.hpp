@@ -98,13 +98,13 @@ inline void Loop<X, single>::close_interval()
     engine_.count_deferred(doubt);
     if (doubt + 1 < steps) return take_back_to(doubt, steps - 1);
     planner().steps().clear();
-    judge();
+    verify();
 }
 
 template <class X, bool single>
-inline void Loop<X, single>::judge()
+inline void Loop<X, single>::verify()
 {
-    if (engine_.judges_suspicious() && search(false)) return;
+    if (engine_.doubts_remain() && search(false)) return;
     if (engine_.watching()) return pass();
     if (engine_.settle_verified()) return;
     pass();

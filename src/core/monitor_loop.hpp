@@ -415,7 +415,7 @@ private:
             if (doubt == Planner<X, single>::none) {
                 engine_.count_deferred(1);
             } else if (!planner().wrong()) {
-                found = engine_.judges_suspicious() && finds(false);
+                found = engine_.doubts_remain() && finds(false);
                 if (!found && !ended() && engine_.settle_verified()) return false;
             }
         }
