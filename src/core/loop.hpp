@@ -118,7 +118,7 @@ public:
         return engine_.shown(now().mode());
     }
     [[nodiscard]] std::vector<double> reaction() const override;
-    [[nodiscard]] bool ended() const noexcept override { return engine_.ended(); }
+    [[nodiscard]] bool ended() const noexcept override { return has_ended(); }
     /// Result so far; `finish` brings its time and state up to date.
     [[nodiscard]] const Run<X>& run() const noexcept override { return engine_.run(); }
 
@@ -130,8 +130,8 @@ public:
     bool step() override
     {
         show_all();
-        if (!ended()) advance_one({.look_ahead = false});
-        return !ended();
+        if (!has_ended()) advance_one({.look_ahead = false});
+        return !has_ended();
     }
 
     /// Advances to the next sample time or event, which is shown once, with all others at its
@@ -188,7 +188,7 @@ public:
     /// Lets a run that was cancelled continue.
     void go_on() noexcept override
     {
-        if (ended() && result().outcome == Outcome::cancelled) engine_.reopen();
+        if (has_ended() && result().outcome == Outcome::cancelled) engine_.reopen();
     }
 
     /// State on which the future of the run depends. A simulation of the same system with the same
@@ -228,6 +228,7 @@ private:
     [[nodiscard]] double& h_next() noexcept { return engine_.h_next(); }
     [[nodiscard]] double h_next() const noexcept { return engine_.h_next(); }
     [[nodiscard]] double time_event() const noexcept { return engine_.time_event(); }
+    [[nodiscard]] bool has_ended() const noexcept { return engine_.ended(); }
     /// The current step ends neither at a time event nor at the end of the run.
     void end_early() noexcept { is_last_ = engine_.ends_at().time_event = false; }
 
@@ -547,7 +548,7 @@ private:
     {
         const double t = now().start().value;
         const bool goes_on =
-            !ended() && phases_->goes_on &&
+            !has_ended() && phases_->goes_on &&
             phases_->goes_on(system().adapter(), now().mode(), t, now().x0(), has_advanced);
         if (!goes_on) change_phase(has_advanced);
     }

@@ -36,7 +36,7 @@ bool Loop<X, single>::search(bool cleared)
         }
         found = find(false);
     }
-    if (!found) return ended();
+    if (!found) return has_ended();
     const double t = engine_.set_time();
     record_step_to_set(engine_.set_offset(), t);
     limit_next_step(t);

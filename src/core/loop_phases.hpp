@@ -14,12 +14,13 @@ void Loop<X, single>::change_phase(bool has_advanced)
         X x = now().x0();
         const double t = now().start().value;
         const PhaseVerdict verdict =
-            ended() ? phases_->give_up(
-                          phases_->adapter,
-                          {result().outcome, result().guard, t, now().mode(), now().x0()}, x)
-                    : phases_->review(
-                          phases_->adapter,
-                          {t, now().mode(), now().x0(), now().rate0(), h_next(), has_advanced}, x);
+            has_ended()
+                ? phases_->give_up(phases_->adapter,
+                                   {result().outcome, result().guard, t, now().mode(), now().x0()},
+                                   x)
+                : phases_->review(
+                      phases_->adapter,
+                      {t, now().mode(), now().x0(), now().rate0(), h_next(), has_advanced}, x);
         if (verdict.kind == PhaseVerdict::Kind::stands) break;
         if (verdict.kind == PhaseVerdict::Kind::ends) {
             engine_.end(verdict.outcome);
@@ -29,7 +30,7 @@ void Loop<X, single>::change_phase(bool has_advanced)
         continue_from(x, verdict.mode, verdict.h);
     }
     engine_.hide_guards_of_phases();
-    if (ended() && phases_->reaction) result().reaction = reaction_here();
+    if (has_ended() && phases_->reaction) result().reaction = reaction_here();
 }
 
 template <class X, bool single>
@@ -62,8 +63,8 @@ void Loop<X, single>::add_reaction(double t, const X& x, double offset)
 {
     // A run that has ended stays where it is, and none of its functions is called any more.
     result().reactions.push_back(
-        ended() ? result().reaction
-                : reaction_at({now().mode(), now().start().value, now().x0(), offset, t, x}));
+        has_ended() ? result().reaction
+                    : reaction_at({now().mode(), now().start().value, now().x0(), offset, t, x}));
 }
 
 template <class X, bool single>

@@ -48,7 +48,7 @@ inline void Loop<X, single>::run_quietly(QuietRun& quiet)
 template <class X, bool single>
 inline bool Loop<X, single>::go_to_quiet_steps(QuietRun& quiet, bool beyond)
 {
-    for (bool here = !beyond; !ended(); here = true) {
+    for (bool here = !beyond; !has_ended(); here = true) {
         if (may_run_quietly()) {
             quiet = quiet_orders();
             if (here) return true;

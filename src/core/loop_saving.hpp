@@ -37,7 +37,7 @@ inline void Loop<X, single>::restore(const Snapshot& snapshot)
     }
     go_on_from_place();
     show_all();
-    if (ended() && phases_ && phases_->reaction) result().reaction = reaction_here();
+    if (has_ended() && phases_ && phases_->reaction) result().reaction = reaction_here();
 }
 
 template <class X, bool single>
@@ -102,7 +102,7 @@ inline void Loop<X, single>::visit_cause(Visitor&& visit)
 {
     constexpr bool saves = std::remove_cvref_t<Visitor>::saves;
     if constexpr (!saves) engine_.forget_cause();
-    if (!ended()) return;
+    if (!has_ended()) return;
     visit(result().guard);
     visit(result().other_guard);
     if (result().outcome != Outcome::wrong_bound) return;

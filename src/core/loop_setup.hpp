@@ -59,7 +59,7 @@ inline void Loop<X, single>::refuse_bad_place() const
     require(std::isfinite(place_.t.value) && std::fabs(place_.t.remainder) <= ulp &&
                 !lies_before(place_.t.value, options().t_start),
             "the time");
-    require(ended() ||
+    require(has_ended() ||
                 (all_finite(place_.x) && all_finite(place_.remainder) && all_finite(place_.rate)),
             "the state");
     require(h_next() > 0 && std::isfinite(h_next()) &&
@@ -68,7 +68,8 @@ inline void Loop<X, single>::refuse_bad_place() const
     require(first_step_ > 0 && std::isfinite(first_step_), "the first step");
     require(std::isfinite(flight_start_) && longest_step_ >= 0 && std::isfinite(longest_step_),
             "the last event");
-    require(ended() || lies_before(place_.t.value, time_event()) || !timed_, "the next time event");
+    require(has_ended() || lies_before(place_.t.value, time_event()) || !timed_,
+            "the next time event");
     const std::size_t modes = engine_.modes();
     require(modes == 0 || place_.mode < modes, "the mode");
     require(engine_.holds().fit(components), "what a rest holds");

@@ -11,14 +11,14 @@ inline bool Loop<X, single>::advance()
 {
     for (;;) {
         if (show_next()) return true;
-        if (ended()) {
+        if (has_ended()) {
             emit_last_samples();
             return show_next();
         }
         if (phases_) shown_step_ = {now().mode(), now().start().value, now().x0()};
         do {
             advance_one({.to_next_sample = true});
-        } while (!ended() && is_tentative());
+        } while (!has_ended() && is_tentative());
     }
 }
 
@@ -53,9 +53,9 @@ bool Loop<X, single>::show_next()
 template <class X, bool single>
 inline void Loop<X, single>::run_to_end()
 {
-    const bool starts = !ended() && next_review_ == 0 && now().until(options().t_end) > 0;
+    const bool starts = !has_ended() && next_review_ == 0 && now().until(options().t_end) > 0;
     if (starts && !may_take_more_steps()) return;
-    while (!ended()) {
+    while (!has_ended()) {
         if (may_run_quietly() && run_quietly()) continue;
         advance_one({});
     }
@@ -64,7 +64,7 @@ inline void Loop<X, single>::run_to_end()
 template <class X, bool single>
 inline Run<X> Loop<X, single>::finish()
 {
-    if (!ended()) {
+    if (!has_ended()) {
         result().outcome = Outcome::cancelled;
         result().reaction.clear();
     }
@@ -83,7 +83,7 @@ inline const Run<X>& Loop<X, single>::bring_up_to_date()
     result().mode = engine_.shown(now().mode());
     engine_.bring_up_to_date();
     if (phases_ && phases_->complete) phases_->complete(system().adapter(), result());
-    if (ended()) {
+    if (has_ended()) {
         if (next_sample_ < options().sample_times.size()) emit_last_samples();
         record_restart();
     }
@@ -126,7 +126,7 @@ bool Loop<X, single>::may_take_more_steps()
     renew(set_review_, options().stall_steps > 0 ? instants_to_stall() : 0, is_first);
     renew(pace_review_, pace_steps(), is_first);
     next_review_ = std::min({stall_review_.due, set_review_.due, pace_review_.due});
-    return !ended();
+    return !has_ended();
 }
 
 template <class X, bool single>
@@ -312,7 +312,7 @@ bool Loop<X, single>::shorten_to_release()
     if (release.hold == no_guard) {
         const std::size_t left = engine_.holds().guard_left_at(now().time(h), now().x1());
         if (left != no_guard) engine_.end(Outcome::zeno, left);
-        return !ended();
+        return !has_ended();
     }
     if (release.at < h) {
         end_early();

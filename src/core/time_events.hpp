@@ -37,8 +37,8 @@ public:
     [[nodiscard]] bool was_at(double t) const noexcept { return passed_ == t; }
 
     /// Finds the next one at the start of the step. One of a timer in the state, or of a list, may
-    /// be due there; then any other has to lie ahead: false if it does not, so that it would be
-    /// lost, with all that follow it.
+    /// be due there. Any other has to lie ahead: false if it does not, since it would be lost, with
+    /// all that follow it.
     /// @param window  [s] length of the window of simultaneous events there
     [[nodiscard]] bool find(After what, const Step<X>& step, double window)
     {
