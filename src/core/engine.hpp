@@ -682,13 +682,13 @@ private:
     [[nodiscard]] bool repeats(std::size_t i, double t) const noexcept
     {
         const GuardRecord& record = guards_[i];
-        const double reach = record.returned ? resolution_.blur(t) : resolution_.window(t);
-        return record.side == record.last_side && std::fabs(t - record.last) <= reach;
+        const double reach = record.last.returned ? resolution_.blur(t) : resolution_.window(t);
+        return record.side == record.last.side && std::fabs(t - record.last.t) <= reach;
     }
 
     [[nodiscard]] bool turned_back(std::size_t i) const noexcept
     {
-        return resets_any_ && guards_[i].info.resets && guards_[i].turned;
+        return resets_any_ && guards_[i].info.resets && guards_[i].departure.turned;
     }
 
     /// Whether a guard of a set still has its event where another reset has been applied first.
@@ -985,9 +985,9 @@ private:
     {
         const GuardRecord& record = std::as_const(guards_)[i];
         if (record.acting) return false;
-        if (!first_set_) return !on_time_ && record.recorded_in + 1 == armings_;
+        if (!first_set_) return !on_time_ && record.last.recorded_in + 1 == armings_;
         const double t = step_.time(0);
-        return std::fabs(t - record.last) <= resolution_.blur(t);
+        return std::fabs(t - record.last.t) <= resolution_.blur(t);
     }
     /// Whether guard i stands on its surface, and no side is known from which it came.
     [[nodiscard]] bool stands(std::size_t i) const noexcept

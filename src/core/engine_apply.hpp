@@ -87,7 +87,7 @@ inline void EventEngine<X, single>::find_tolerance(std::size_t i, double t)
 {
     GuardRecord& record = guards_[i];
     const Location& where = search_.where(i);
-    record.jumped = where.jump;
+    record.last.jumped = where.jump;
     if (where.jump) {  // the state is beyond the jump, and the guard is not small there
         record.estimated = false;
         record.noted.tolerance = 0;

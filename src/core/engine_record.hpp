@@ -82,25 +82,26 @@ inline void EventEngine<X, single>::note_crossings_to_set()
     guards_.complete_rates(step_, calls());
     for (const std::size_t i : guards_.suspects()) {
         GuardRecord& record = guards_[i];
-        if (record.from == 0 && search_.comes_later(step_, guards_, i)) continue;
+        if (record.examined.from == 0 && search_.comes_later(step_, guards_, i)) continue;
         if (!guards_.suspicious(i, step_.h()) || is_member(i)) continue;
         const GuardSample at = search_.sample_at_set(step_, guards_, i, calls());
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
         const double ulp = epsilon * std::fabs(step_.time(at.s));
         const double rounded = std::fabs(at.value) + std::fabs(at.rate) * ulp;
         const double close = 8 * finest_bracket(at.s, step_.h());
-        if (record.from > at.s + close) {  // events that were found behind the set do not happen
+        // Events that were found behind the set do not happen.
+        if (record.examined.from > at.s + close) {
             if (at.value != 0) guards_.arm(i, side_of(at.value));
             continue;
         }
         // It has crossed together with the set, without effect: rounding does not take the crossing
         // back.
-        if (record.from > 0 && at.s - record.from <= close) {
+        if (record.examined.from > 0 && at.s - record.examined.from <= close) {
             if (!record.info.boolean) record.noted.tolerance = rounded;
             continue;
         }
         const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays there
-        const bool may_cross = !record.info.boolean && !rests && at.s > record.from;
+        const bool may_cross = !record.info.boolean && !rests && at.s > record.examined.from;
         const bool with_set = may_cross && (search_.crosses_with_set(step_, guards_, i, at) ||
                                             is_rounding_at_set(i, at));
         GuardSample last = at;
@@ -155,9 +156,9 @@ inline void EventEngine<X, single>::count_event(std::size_t i, double t, Side si
     GuardRecord& record = guards_[i];
     run_.statistics.events += !is_of_phases(i);
     ++record.events;
-    record.last = t;
-    record.last_side = side;
-    record.returned = false;
+    record.last.t = t;
+    record.last.side = side;
+    record.last.returned = false;
 }
 
 template <class X, bool single>
@@ -259,7 +260,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::record_jump(std::size_t i, Side before)
 {
     const double t = step_.time(0);
-    guards_[i].recorded_in = armings_;
+    guards_[i].last.recorded_in = armings_;
     count_event(i, t, before);
     record({.t = t,
             .guard = i,
@@ -316,7 +317,7 @@ inline void EventEngine<X, single>::record_notes(double s)
         const double t = time_of(note, s);
         count_event(note.guard, t, note.side);
         if (is_of_phases(note.guard)) continue;
-        guards_[note.guard].returned = note.kind == EventKind::touch;
+        guards_[note.guard].last.returned = note.kind == EventKind::touch;
         if (!options_.record_events) continue;
         Event<X> event{.t = t,
                        .kind = note.kind,

@@ -145,8 +145,8 @@ template <class X, bool single>
 inline bool EventEngine<X, single>::fades(std::size_t i)
 {
     GuardRecord& record = guards_[i];
-    record.turned = false;
-    record.rated_over = stale;
+    record.departure.turned = false;
+    record.departure.over = stale;
     record.intervals.depart(infinity, false);
     if (record.info.boolean || !system_.enabled_in(i, step_.mode())) {
         return false;
@@ -165,7 +165,7 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
         // carried this one across its surface.
         const double beyond = located_ ? -away - 2 * record.tolerance : -away;
         if (std::max(away, beyond) > tolerances::of_fading * rounding) {
-            record.turned = away > 0;
+            record.departure.turned = away > 0;
             return false;
         }
     } else {
@@ -194,11 +194,11 @@ inline bool EventEngine<X, single>::fades(std::size_t i)
             if (lost) rate = 0;
         }
     }
-    record.departure = rate;
-    record.rated_over = low ? stale : h_next_;
-    record.turned = lost || sign_of(record.last_side) * rate > 0;
-    if (record.turned) record.intervals.depart(rate, low);
-    if (jump_lost && located_ && (lost || !record.turned)) return true;
+    record.departure.rate = rate;
+    record.departure.over = low ? stale : h_next_;
+    record.departure.turned = lost || sign_of(record.last.side) * rate > 0;
+    if (record.departure.turned) record.intervals.depart(rate, low);
+    if (jump_lost && located_ && (lost || !record.departure.turned)) return true;
     return low && !came_far && record.intervals.fades(rounding);
 }
 
@@ -245,7 +245,7 @@ template <class X, bool single>
 inline double EventEngine<X, single>::distance_put_back(std::size_t i)
 {
     const double g = guards_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
-    return sign_of(guards_[i].last_side) * g;
+    return sign_of(guards_[i].last.side) * g;
 }
 
 template <class X, bool single>
@@ -297,7 +297,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     step_.restart(ahead, 0, after, mode_after);
     start_beyond_time_event();
     for (const std::size_t k : search_.fired()) {
-        guards_[k].rated_over = stale;
+        guards_[k].departure.over = stale;
     }
     guards_[i].intervals.come_to_rest();
     guards_.row().clear();

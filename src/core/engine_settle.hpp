@@ -186,7 +186,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::note_left_start(std::size_t i)
 {
     const GuardRecord& record = std::as_const(guards_)[i];
-    if (record.armed_beyond || !std::isnan(record.last) || !record.enabled) return;
+    if (record.armed_beyond || !std::isnan(record.last.t) || !record.enabled) return;
     if (!is_beyond(record.side, record.info.crossing)) return;
     const double g = guards_.view(i, step_.mode(), calls()).value(step_.time(0), step_.x0());
     if (side_of(g) != record.side || std::fabs(g) <= rounding_of(i)) return;
@@ -234,7 +234,7 @@ inline void EventEngine<X, single>::enable_guards()
         if (enabled == now.enabled && !now.newly_enabled && !enters) continue;
         GuardRecord& record = guards_[i];
         record.newly_enabled = enabled && (enters || !record.enabled);
-        if (record.newly_enabled) record.last = std::numeric_limits<double>::quiet_NaN();
+        if (record.newly_enabled) record.last.t = std::numeric_limits<double>::quiet_NaN();
         record.enabled = enabled;
     }
     guards_.heed_enabled();
@@ -293,7 +293,7 @@ inline bool EventEngine<X, single>::arm_one(std::size_t i, double widest, bool o
                                                                       : life::Cause::stood;
     record.departs = seen.on || record.fired || record.newly_enabled;
     guards_.arm(i, side);
-    record.from = 0;
+    record.examined.from = 0;
     if (side == Side::plateau) {
         guards_.await(i, life::awaited_side(cause, record.info, before));
     }
@@ -409,7 +409,7 @@ bool EventEngine<X, single>::is_set_in_motion(std::size_t i)
         // A guard that has had its event at this instant does not have it again because a reset of
         // another guard lets its crossing go on.
         const double t = step_.time(0);
-        const double ago = std::fabs(t - std::as_const(guards_)[i].last);
+        const double ago = std::fabs(t - std::as_const(guards_)[i].last.t);
         if (!stands(i) || ago <= resolution_.blur(t)) return false;
     }
     return !(same_state(search_.before(), step_.x0()) && same_state(left_rate_, step_.rate0()));
@@ -450,17 +450,18 @@ inline bool EventEngine<X, single>::lies_within_rounding(std::size_t i)
 template <class X, bool single>
 inline Side EventEngine<X, single>::heading(std::size_t i)
 {
-    const bool known = guards_[i].fired && guards_[i].rated_over == h_next_;
-    double rate = known ? guards_[i].departure : guards_.complete_rate0(i, step_, h_next_, calls());
+    const bool known = guards_[i].fired && guards_[i].departure.over == h_next_;
+    double rate =
+        known ? guards_[i].departure.rate : guards_.complete_rate0(i, step_, h_next_, calls());
     if (known) guards_.set_rate0(i, rate);
-    guards_[i].rated_over = stale;
+    guards_[i].departure.over = stale;
     if (!system_->rated) {
-        if (guards_[i].fired && guards_[i].turned && guards_[i].intervals.is_low()) {
-            rate = guards_[i].departure;
+        if (guards_[i].fired && guards_[i].departure.turned && guards_[i].intervals.is_low()) {
+            rate = guards_[i].departure.rate;
             if (rate == 0) {
                 // The guard is too slow for its rate to be known: its reset has sent it back,
                 // and its next event comes when it returns to the surface.
-                const Side back = guards_[i].last_side;
+                const Side back = guards_[i].last.side;
                 guards_.set_rate0(i, sign_of(back) * std::numeric_limits<double>::min());
                 return back;
             }

@@ -44,7 +44,7 @@ double EventEngine<X, single>::rate_of_tie(std::size_t i)
     if (!(std::fabs(g) <= 2 * slope * reach)) return 0;
     // A touch has a rate there that is itself no more than rounding.
     const double rate0 = rate_at(step_.time(0), step_.x0(), step_.rate0());
-    const double g0 = guards_[i].from > 0 ? g - h * (rate0 + rate) / 2 : guards_.g0(i);
+    const double g0 = guards_[i].examined.from > 0 ? g - h * (rate0 + rate) / 2 : guards_.g0(i);
     const double curvature = (6 * (g0 - g) / h + 2 * rate0 + 4 * rate) / h;
     double noise = std::fabs(curvature) * ulps;
     X near = step_.x1();

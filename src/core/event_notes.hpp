@@ -34,17 +34,17 @@ inline void EventSearch<X, single>::note_crossings(const CurrentStep& step, Guar
             notes_.push_back(
                 {.guard = i, .kind = kind_of(where), .side = finding.side, .where = where});
         }
-        const bool stays = record.from > 0 && !(where.root > record.from);
-        const bool creeps = creep.is_too_long(record.from, where.root);
+        const bool stays = record.examined.from > 0 && !(where.root > record.examined.from);
+        const bool creeps = creep.is_too_long(record.examined.from, where.root);
         pass(guards, i, side, where, probe);
         if (stays && ++stalled > 8) {  // noise around a flat root
-            record.next = side_of(end.value);
+            record.examined.next = side_of(end.value);
             return;
         }
         if (creeps) {
             const double behind = creep.behind(where.root);
             if (!(behind < end.s)) {
-                record.next = side_of(end.value);
+                record.examined.next = side_of(end.value);
                 return;
             }
             pass_behind(guards, i, side, behind, probe);
@@ -62,7 +62,7 @@ inline void EventSearch<X, single>::pass(const CurrentStep& step, Guards& guards
         std::find_if(hits_.begin(), hits_.end(), [i](const Hit& each) { return each.guard == i; });
     if (hit == hits_.end()) return;
     const Side side = opposite(hit->side);
-    const double from = guards[i].from;
+    const double from = guards[i].examined.from;
     pass(guards, i, side, hit->where, probe);
     if (!creep_) creep_.emplace(step.h());
     if (!creep_->is_too_long(from, hit->where.root)) return;

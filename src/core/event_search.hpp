@@ -604,23 +604,25 @@ private:
     [[nodiscard]] static bool is_over(Probe& probe, const Watch& watch, GuardRecord& record)
     {
         const double h = probe.step().h();
-        if (record.from > 0 && watch.end.s - record.from <= 8 * finest_bracket(watch.end.s, h)) {
-            record.next = record.side;
+        if (record.examined.from > 0 &&
+            watch.end.s - record.examined.from <= 8 * finest_bracket(watch.end.s, h)) {
+            record.examined.next = record.side;
             return true;
         }
-        if (record.from > 0 && ends_within_rounding(probe, watch, record.slope)) {
-            record.next = record.side;
+        if (record.examined.from > 0 && ends_within_rounding(probe, watch, record.examined.slope)) {
+            record.examined.next = record.side;
             return true;
         }
         if (is_plateau(probe, watch)) {
             // After a crossing a guard that moves by no more than its rounding is not on a plateau.
             const double moves = std::fabs(watch.start.rate) * (watch.end.s - watch.start.s);
             const bool rated = std::fabs(watch.start.rate) > std::numeric_limits<double>::min();
-            const bool crossing = record.from > 0 && rated && moves <= probe.blur(watch.end.s);
+            const bool crossing =
+                record.examined.from > 0 && rated && moves <= probe.blur(watch.end.s);
             if (crossing) {
-                record.next = record.side;
+                record.examined.next = record.side;
             } else {
-                record.next = record.awaited = Side::plateau;
+                record.examined.next = record.awaited = Side::plateau;
             }
             return true;
         }
@@ -667,7 +669,7 @@ private:
             touched(guards, i, finding.side, finding.hi.s);
         } else if (!finding.hit) {
             evidence_ = std::max(evidence_, finding.evidence);
-            guards[i].next = watch.side_after;
+            guards[i].examined.next = watch.side_after;
         }
         return finding;
     }
@@ -751,7 +753,7 @@ private:
             if (start.rate == 0) start.rate = start.value;
         }
         guards.go_on_from(i, side, start);
-        guards[i].slope = where.slope;
+        guards[i].examined.slope = where.slope;
     }
 
     /// Continues the search at the offset `behind` an event, on the side of the guard there.
@@ -772,7 +774,7 @@ private:
                                                         double h, double e) const
     {
         const Side side = guards[i].side;
-        return guards[i].from == 0 && !guards[i].info.boolean &&
+        return guards[i].examined.from == 0 && !guards[i].info.boolean &&
                counts(side, guards[i].info.crossing) && guards.is_plain(i, h, e) &&
                finders_->leaves_plainly(sign_of(side), guards.start(i), guards.end(i, h),
                                         guards.touch(i, h));
@@ -802,7 +804,7 @@ private:
             const Finding finding = next_finding(probe, watch, guards, i);
             if (finding.touch) continue;
             if (!finding.hit) return;
-            if (guards[i].from > 0 && !finding.late) {
+            if (guards[i].examined.from > 0 && !finding.late) {
                 probe.watch(finding.side);
                 GuardSample lo = finding.lo;
                 if (!probe.agree_on(lo, finding.hi, guards.start(i), guards[i].side)) {

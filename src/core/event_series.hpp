@@ -85,7 +85,7 @@ bool EventSearch<X, single>::find_by_series(const CurrentStep& step, Guards& gua
 {
     const GuardRecord& record = guards[i];
     if (!resolution_.is_finest() || !finders_->locator.yields_to_series) return false;
-    if (record.from > 0 || !counts(record.side, record.info.crossing)) return false;
+    if (record.examined.from > 0 || !counts(record.side, record.info.crossing)) return false;
     if (record.info.touch > 0) return false;
     SeriesCrossing crossing{.which = i,
                             .side = record.side,

@@ -81,42 +81,57 @@ struct TimesAtInstant {
     std::uint32_t times = 0;
 };
 
+/// The last event of a guard.
+struct PastEvent {
+    double t = std::numeric_limits<double>::quiet_NaN();  ///< [s]
+    Side side = Side::plateau;                            ///< that it left then
+    bool returned = false;  ///< it has come back to that side from the other one
+    bool jumped = false;    ///< it was a jump
+    /// The arming of all guards by which it has been recorded.
+    std::uint64_t recorded_in = std::numeric_limits<std::uint64_t>::max();
+};
+
+/// How a guard leaves its surface after its last reset.
+struct Departure {
+    bool turned = false;  ///< it has been sent back
+    double rate = 0;      ///< [1/s]
+    /// [s] scale over which the rate was taken; NaN if it is not one of the current state.
+    double over = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// How far a guard has been examined in the current step.
+struct Examined {
+    double from = 0;            ///< [s] offset up to which it has been
+    double slope = 0;           ///< [1/s] its rate there; NaN if it is not known
+    Side next = Side::plateau;  ///< its side at the end of the step, if it stands
+    bool dips = false;          ///< its bounds show an event
+};
+
 /// State of a guard besides its values.
 struct GuardRecord {
     GuardInfo info;
+    bool acting = false;  ///< has a reset or may end the run; else events are only recorded
     bool enabled = true;
     bool newly_enabled = false;
-    bool fired = false;
-    bool turned = false;   ///< its last reset has sent it back from the surface
-    double departure = 0;  ///< [1/s] its rate after the last reset
-    /// [s] scale over which that rate was taken; NaN if it is not a rate of the current state.
-    double rated_over = std::numeric_limits<double>::quiet_NaN();
-    bool again = false;            ///< it has returned inside the window of its last event
-    Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
-    bool acting = false;    ///< has a reset or may end the run; else events are only recorded
     bool deferred = false;  ///< its check is deferred: nothing of this step is known of it
     Side side = Side::plateau;
-    Side next = Side::plateau;  ///< at the end of the step, if it stands
-    bool dips = false;          ///< its bounds show an event in the current step
-    bool jumped = false;        ///< its last event was a jump
-    bool departs = false;       ///< the current smooth phase started at its event, or enabled it
-    double tolerance =
-        0;  ///< event tolerance: |g| where it fired, up to which it counts as being on its surface
+    Side awaited = Side::plateau;  ///< on a plateau: leaving it away from here is an event
+    bool departs = false;          ///< the current smooth phase started at its event, or enabled it
+    bool fired = false;
+    bool again = false;  ///< it has returned inside the window of its last event
+    /// Event tolerance: |g| where it fired, up to which it counts as being on its surface.
+    double tolerance = 0;
     bool estimated = false;  ///< the tolerance is the error of location, not a value of the guard
-    NotedAtSet noted;
-    double from = 0;   ///< [s] offset in the step up to which it has been examined
-    double slope = 0;  ///< [1/s] its rate there; NaN if it is not known
-    std::uint64_t events = 0;
-    double last = std::numeric_limits<double>::quiet_NaN();  ///< [s] time of its last event
-    Side last_side = Side::plateau;                          ///< the side it left then
-    bool returned = false;  ///< it has come back to that side from the other one
-    ShrinkingIntervals intervals;
-    Excursions excursions;
-    TimesAtInstant here;  ///< events at the start of a step
-    /// The arming of all guards by which its last event has been recorded.
-    std::uint64_t recorded_in = std::numeric_limits<std::uint64_t>::max();
     bool armed_beyond = false;  ///< where it was armed at the start, or by a mode
     bool armed_on = false;      ///< the last time on its surface, moving beyond
+    Examined examined;
+    NotedAtSet noted;
+    Departure departure;
+    PastEvent last;
+    std::uint64_t events = 0;
+    TimesAtInstant here;  ///< events at the start of a step
+    ShrinkingIntervals intervals;
+    Excursions excursions;
 };
 
 [[nodiscard]] constexpr double sign_of(Side side) noexcept

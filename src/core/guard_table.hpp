@@ -92,7 +92,7 @@ public:
         if (rules_.keeps_sizes()) {
             for (std::size_t i = 0; i < size(); ++i) {
                 // The value next to a pole is no measure of the size of a guard.
-                if (records_[i].fired && records_[i].jumped) continue;
+                if (records_[i].fired && records_[i].last.jumped) continue;
                 sizes_[i] = std::fmax(std::fabs(g0_[i]), sizes_[i]);
             }
         }
@@ -234,7 +234,7 @@ public:
 
     [[nodiscard]] GuardSample start(std::size_t i) const noexcept
     {
-        return {.s = records_[i].from, .value = g0_[i], .rate = known(rate0_[i])};
+        return {.s = records_[i].examined.from, .value = g0_[i], .rate = known(rate0_[i])};
     }
     [[nodiscard]] GuardSample end(std::size_t i, double h) const noexcept
     {
@@ -284,7 +284,7 @@ public:
     {
         assert(i < size());
         GuardRecord& record = (*this)[i];
-        if (side == record.last_side && record.side == opposite(side)) record.returned = true;
+        if (side == record.last.side && record.side == opposite(side)) record.last.returned = true;
         record.side = side;
         if constexpr (!single) {
             any_stands_ = any_stands_ || (side == Side::plateau && size() > 1);
@@ -305,7 +305,7 @@ public:
         if (!(as_before && clear) || kept_out) return false;
         record.estimated = false;
         record.departs = false;
-        record.from = 0;
+        record.examined.from = 0;
         arm(i, record.side);
         if constexpr (!single) at_rest_[i] = record.tolerance == 0 && !record.deferred ? 1 : 0;
         return true;
@@ -394,17 +394,17 @@ public:
         // A guard that wakes or leaves its plateau has to be screened again.
         if (rules_.defers || waiting_) forget_screening();
         if (!screened_) screen(h);
-        for (const std::size_t i : suspects_) records_[i].next = records_[i].side;
+        for (const std::size_t i : suspects_) records_[i].examined.next = records_[i].side;
     }
 
     /// Continues the guard from `start` inside the step, on `side`.
     void go_on_from(std::size_t i, Side side, const GuardSample& start) noexcept
     {
-        assert(start.s >= records_[i].from);
+        assert(start.s >= records_[i].examined.from);
         arm(i, side);
-        records_[i].next = side;
-        records_[i].from = start.s;
-        records_[i].slope = std::numeric_limits<double>::quiet_NaN();
+        records_[i].examined.next = side;
+        records_[i].examined.from = start.s;
+        records_[i].examined.slope = std::numeric_limits<double>::quiet_NaN();
         g0_[i] = start.value;
         rate0_[i] = start.rate;
     }
@@ -435,8 +435,8 @@ public:
     void pass_on_after_events() noexcept
     {
         for (const std::size_t i : suspects_) {
-            records_[i].from = 0;
-            arm(i, records_[i].next);
+            records_[i].examined.from = 0;
+            arm(i, records_[i].examined.next);
         }
         pass_on();
     }
@@ -488,11 +488,11 @@ public:
             visit(record.enabled);
             visit(record.side);
             visit(record.events);
-            visit(record.last);
-            visit(record.last_side);
-            visit(record.returned);
+            visit(record.last.t);
+            visit(record.last.side);
+            visit(record.last.returned);
             visit(record.tolerance);
-            visit(record.turned);
+            visit(record.departure.turned);
             visit(record.departs);
             visit(record.awaited);
             if (rules_.defers) visit(record.deferred);
@@ -522,7 +522,7 @@ public:
 private:
     [[nodiscard]] bool departs(const GuardRecord& record, const Step<X>& step) const noexcept
     {
-        return record.departs && record.from == 0 && step.time(0) == armed_at_;
+        return record.departs && record.examined.from == 0 && step.time(0) == armed_at_;
     }
 
     template <class Change>

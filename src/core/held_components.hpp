@@ -253,8 +253,8 @@ bool HeldComponents<X, single>::presses(const Rested& rested, Hold& hold, double
     hold.guard = i;
     hold.inward = crossing == Crossing::falling    ? 1
                   : crossing == Crossing::rising   ? -1
-                  : sign_of(record.last_side) == 0 ? 1
-                                                   : sign_of(record.last_side);
+                  : sign_of(record.last.side) == 0 ? 1
+                                                   : sign_of(record.last.side);
     hold.rounding = rounding_of(i);
     hold.level = std::max(hold.rounding, rested.tolerance);
     if (hold.inward * value_here(i) > hold.level) return false;

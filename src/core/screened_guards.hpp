@@ -264,7 +264,7 @@ public:
     /// Takes note of whether the bounds of guard i show an event inside the step.
     void note_dip(std::size_t i, bool dips) noexcept
     {
-        records_[i].dips = dips;
+        records_[i].examined.dips = dips;
         dips_ = dips_ || dips;
         forget_screening();
     }
@@ -279,7 +279,7 @@ public:
     [[nodiscard]] bool suspicious(std::size_t i, double h) const noexcept
     {
         if (sign_[i] == 0) return false;
-        if (!single && records_[i].dips) return true;
+        if (!single && records_[i].examined.dips) return true;
         if (has_series(i)) return !is_clear_of_series(i, h);
         if (ends_beyond(i)) return true;
         const double tolerance =
@@ -580,7 +580,7 @@ protected:
     {
         const double touch = records_[i].info.touch;
         const bool departs = records_[i].departs && starts_phase_;
-        if (records_[i].from > 0 || !(sign_[i] * g1_[i] > touch)) return false;
+        if (records_[i].examined.from > 0 || !(sign_[i] * g1_[i] > touch)) return false;
         if (!departs && sign_[i] * g0_[i] < 0) return false;
         const GuardSeries guard{.terms = series_,
                                 .which = i,

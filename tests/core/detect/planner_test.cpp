@@ -346,7 +346,7 @@ TEST(Planner, AStepInDoubtIsDividedUntilItIsCoveredOrAnEventIsSeen)
         plan.table.forget_dips();
         plan.planner.close_inside(plan.step, plan.table, plan.search, plan.counts);
         EXPECT_EQ(plan.judged(), least > 0 ? Guards{} : Guards{0});
-        EXPECT_EQ(std::as_const(plan.table)[0].dips, least < 0);
+        EXPECT_EQ(std::as_const(plan.table)[0].examined.dips, least < 0);
         if (least > 0) {
             EXPECT_NEAR(plan.planner.limit(), 1.275, rounding);
         }

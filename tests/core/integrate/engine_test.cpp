@@ -169,7 +169,7 @@ TEST(EventEngine, ForgetsARunBeforeAnotherOneStarts)
     EXPECT_TRUE(loop.engine.holds().empty());
     EXPECT_EQ(loop.engine.run().outcome, Outcome::reached_end);
     EXPECT_EQ(loop.engine.run().guard, no_guard);
-    EXPECT_TRUE(std::isnan(loop.engine.guards()[0].last));
+    EXPECT_TRUE(std::isnan(loop.engine.guards()[0].last.t));
 }
 
 }  // namespace

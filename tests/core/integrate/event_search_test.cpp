@@ -212,7 +212,7 @@ TEST(EventSearch, ATouchIsNoCrossing)
     EXPECT_EQ(touches.search.notes()[0].kind, EventKind::touch);
     EXPECT_NEAR(touches.search.notes()[0].where.root, 0.5, 1e-8);  // of a double root
     EXPECT_EQ(touches.search.noted(0), 0u);
-    EXPECT_EQ(touches.table[0].next, Side::above);
+    EXPECT_EQ(touches.table[0].examined.next, Side::above);
     touches.search.begin(touches.step.x0());
     EXPECT_TRUE(touches.search.notes().empty());
     EXPECT_FALSE(InStep({dip(0.5, 0, {.crossing = Crossing::either})}).find());
@@ -238,8 +238,8 @@ TEST(EventSearch, EveryCrossingOfARecordedGuardIsNoted)
     in.note_crossings(0);
     EXPECT_EQ(in.search.noted(0), 2u);
     EXPECT_EQ(in.search.noted(1), 1u);
-    EXPECT_EQ(in.table[0].next, Side::above);
-    EXPECT_EQ(in.table[1].next, Side::below);
+    EXPECT_EQ(in.table[0].examined.next, Side::above);
+    EXPECT_EQ(in.table[1].examined.next, Side::below);
 
     in.search.keep_notes_until(0.7);
     const auto& notes = in.search.notes();

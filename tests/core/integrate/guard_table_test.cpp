@@ -163,11 +163,11 @@ TEST(GuardTable, APlateauIsLeftToTheSideAtTheEndOfAStep)
 TEST(GuardTable, AGuardHasReturnedWhereItIsBackOnTheSideOfItsLastEvent)
 {
     TableOf of({line(0.5)});
-    of.table[0].last_side = Side::above;
+    of.table[0].last.side = Side::above;
     of.table.arm(0, Side::below);
-    EXPECT_FALSE(of.table[0].returned);
+    EXPECT_FALSE(of.table[0].last.returned);
     of.table.arm(0, Side::above);
-    EXPECT_TRUE(of.table[0].returned);
+    EXPECT_TRUE(of.table[0].last.returned);
 }
 
 TEST(GuardTable, ADeferredGuardIsNotSuspectedUntilItIsWoken)
@@ -225,16 +225,16 @@ TEST(GuardTable, ForgetsAllButWhatIsDeclaredAndTheNumberOfEvents)
     TableOf of({line(0.5)});
     of.table[0].acting = true;
     of.table[0].events = 7;
-    of.table[0].last = 0.25;
+    of.table[0].last.t = 0.25;
     of.table[0].tolerance = 1e-9;
-    of.table[0].returned = true;
+    of.table[0].last.returned = true;
     of.table.forget();
     const auto& record = std::as_const(of.table)[0];
     EXPECT_TRUE(record.acting);
     EXPECT_EQ(record.events, 7U);
-    EXPECT_TRUE(std::isnan(record.last));
+    EXPECT_TRUE(std::isnan(record.last.t));
     EXPECT_EQ(record.tolerance, 0);
-    EXPECT_FALSE(record.returned);
+    EXPECT_FALSE(record.last.returned);
     EXPECT_EQ(record.side, Side::plateau);
 }
 
