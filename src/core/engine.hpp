@@ -104,6 +104,9 @@ public:
         if (defers_) planner_.emplace(system_, finders_, x0, backward_, guards_.size());
     }
 
+    EventEngine(const EventEngine&) = delete;  // its parts refer to each other
+    EventEngine& operator=(const EventEngine&) = delete;
+
     // --- the run in progress, on which the loop works, too ---
 
     [[nodiscard]] Step<X>& step() noexcept { return step_; }
