@@ -1,5 +1,5 @@
-// Solvers of five reactions, a size that the library has not, compiled once for all tests. Their
-// phases are in exact_phases.cpp, since both together take 1.3 GB.
+// Solvers of five reactions, a size that the library has not, for the long tests: each of these
+// takes a minute to compile. Their phases are in exact_phases.cpp, since both together take 1.3 GB.
 
 #include "ricochet/nonsmooth/solvers.hpp"
 

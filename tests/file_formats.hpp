@@ -265,6 +265,8 @@ protected:
     [[nodiscard]] fs::path file() const { return directory_ / "file"; }
     [[nodiscard]] fs::path written(const std::string& bytes) const
     {
+        fs::remove(
+            file());  // a file that is emptied and written again is waited for by some systems
         std::ofstream(file(), std::ios::binary) << bytes;
         return file();
     }

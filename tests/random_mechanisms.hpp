@@ -9,7 +9,7 @@
 #include <random>
 #include <string>
 
-#include "exact_inclusions.hpp"
+#include "law_at_end.hpp"
 #include "problems/rolling_ball.hpp"
 #include "random_inclusions.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
@@ -216,9 +216,7 @@ struct RandomRollingBall {
             }
         }
         // While it rolls by events y drifts by the tolerance of events, for any other steps.
-        const double broken =
-            law_violation(detail::InclusionMatrices<RollingBall>(system), run.state.t, run.state.w,
-                          run.state.reaction, ball.t_end / 200);
+        const double broken = law_violation_at_end(system, run, ball.t_end / 200);
         if (!(broken <= 1e-6)) {
             return fmt::format("breaks the law by {:.3e}, T/{}, seed {}", broken, divisions, seed);
         }

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <random>
 
-#include "exact_inclusions.hpp"
 #include "problems/super_twisting.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/systems/diode_circuit.hpp"
@@ -114,10 +113,12 @@ TEST(StageSolvers, TheDerivativeOfTheBoundIsThatOfDifferences)
 }
 
 struct Planar {
-    static constexpr int state_size = 2;
+    static constexpr int state_size = 4;
     static constexpr int reaction_size = 2;
-    static void smooth(double, const Eigen::Vector2d&, Eigen::Vector2d& f) { f << 1, 0; }
-    static Ball<2> reaction_set(double, const Eigen::Vector2d&) { return Ball<2>(0.5); }
+    static void smooth(double, const Eigen::Vector4d&, Eigen::Vector4d& f) { f << 1, 0, 0, 0; }
+    static void observe(Eigen::Matrix<double, 2, 4>& e) { e.setIdentity(); }
+    static void act(Eigen::Matrix<double, 4, 2>& g) { g.setIdentity(); }
+    static Ball<2> reaction_set(double, const Eigen::Vector4d&) { return Ball<2>(0.5); }
 };
 
 TEST(StageSolvers, CasesRefuseSetsThatAreNoBoxes)
