@@ -29,7 +29,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 
 }  // namespace
 
-/// SystemAdapter of one run to a system of callbacks, with the arrays that its callbacks are shown.
+/// Adapter of one run to a system of callbacks, with the arrays that its callbacks are shown.
 class CallbackAdapter final : public RunAdapter {
     using Table = detail::SystemTable<State>;
     using Guards = std::vector<CallbackGuard>;

@@ -38,7 +38,7 @@ BoxTree<3> tree_of(const std::vector<Triangle>& triangles)
     return BoxTree<3>(std::move(boxes));
 }
 
-/// WrappedDetector the middle of its box, a little larger than needed.
+/// A ball that contains the triangle, around the middle of its box; a little larger than needed.
 Ball ball_around(const Triangle& t)
 {
     Vector3d lower = t[0], upper = t[0];

@@ -26,15 +26,14 @@ DetectorCase with(const std::string& name, const Detector& detector, Evidence cl
 {
     DetectorCase out = any_detector(name, detector);
     out.claims = claims;
-    out.sees_pairs = claims != Evidence::assumed;
     out.most_calls = most_calls;
     return out;
 }
 
 std::vector<DetectorCase> all()
 {
-    // Nothing can be proved about a host's step, which has no polynomial. WrappedDetector an end at
-    // which the guard is zero it is evaluated at up to four other places.
+    // Nothing can be proved about a host's step, which has no polynomial. Where a guard is zero at
+    // an end it is evaluated at up to four other places.
     return {with("Ends", Ends{}, Evidence::assumed, 5),
             with("Extremum", Extremum{}, Evidence::checked, 61),
             with("Enclosed", Enclosed{}, Evidence::checked, 61),
