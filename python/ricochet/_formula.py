@@ -112,13 +112,25 @@ class _Tape:
         except (TypeError, ValueError):
             return None
 
-
     def symbol(self, given):
         """The number as a symbol, or the symbol itself."""
         index = self.operand(given)
         if index is None:
             raise TypeError(f"formula: found {given!r}, expected a number or a symbol")
         return Symbol(self, index)
+
+
+def _recording(components):
+    """An empty tape, with the symbols of the time and of the state."""
+    tape = _Tape()
+    x = np.empty(components, dtype=object).view(Symbols)
+    for i in range(components):
+        x[i] = tape.add("component", i)
+    return tape, tape.add("time"), x
+
+
+def _called(function, modes, mode, t, x, args):
+    return function(*(() if modes is None else (mode,)), t, x, *(args or ()))
 
 
 class Formula:
@@ -130,12 +142,8 @@ class Formula:
     def __init__(self, function, components, modes, args, title, is_flow):
         tapes = []
         for mode in [None] if modes is None else modes:
-            tape = _Tape()
-            x = np.empty(components, dtype=object).view(Symbols)
-            for i in range(components):
-                x[i] = tape.add("component", i)
-            t = tape.add("time")
-            result = function(*(() if modes is None else (mode,)), t, x, *(args or ()))
+            tape, t, x = _recording(components)
+            result = _called(function, modes, mode, t, x, args)
             tapes.append((tape.ops, self._outputs(tape, result, components, title, is_flow)))
         self._ricochet_formula = _ricochet.Formula(components, tapes)
         address = "flow_address" if is_flow else "guard_address"
@@ -150,14 +158,11 @@ class Formula:
         """
         self, tapes, following = cls.__new__(cls), [], []
         for number, mode in enumerate([None] if modes is None else modes):
-            tape = _Tape()
-            state = [tape.add("component", i) for i in range(components)]
-            t = tape.add("time")
-            x = np.empty(components, dtype=object).view(Symbols)
-            x[:] = state
+            tape, t, x = _recording(components)
+            state = list(x)
             result = (mode, state)
             if within is None or mode in within:
-                result = function(*(() if modes is None else (mode,)), t, x, *(args or ()))
+                result = _called(function, modes, mode, t, x, args)
                 if modes is None:
                     result = (mode, result)
                 elif not isinstance(result, tuple):

@@ -307,6 +307,15 @@ RICOCHET_INLINE void end_inputs(double* x, std::size_t inputs) noexcept
     for (std::size_t i = inputs; i % block<double> != 0; ++i) x[i] = 0;
 }
 
+/// The inputs of the first layer.
+RICOCHET_INLINE void scale_inputs(const GuardLayers& net, const double* in, double* x) noexcept
+{
+    for (std::size_t i = 0; i < net.layers[0].inputs; ++i) {
+        x[i] = (in[i] - net.offset[i]) * net.scale[i];
+    }
+    end_inputs(x, net.layers[0].inputs);
+}
+
 // --- values and derivatives ---
 
 template <class Activation>
@@ -315,10 +324,7 @@ double guard_value(const GuardLayers& net, const double* in) noexcept
     GuardBuffer a, b;
     double* x = a.values;
     double* y = b.values;
-    for (std::size_t i = 0; i < net.layers[0].inputs; ++i) {
-        x[i] = (in[i] - net.offset[i]) * net.scale[i];
-    }
-    end_inputs(x, net.layers[0].inputs);
+    scale_inputs(net, in, x);
     for (std::size_t k = 0; k < net.count; ++k) {
         const GuardLayer& layer = net.layers[k];
         affine<Activation, 1, false, 8>(net, k, {x}, {y});
@@ -342,11 +348,8 @@ double guard_rate(const GuardLayers& net, const double* in, const double* along,
     GuardBuffer buffers[4];
     double *x = buffers[0].values, *dx = buffers[1].values;
     double *y = buffers[2].values, *dy = buffers[3].values;
-    for (std::size_t i = 0; i < net.layers[0].inputs; ++i) {
-        x[i] = (in[i] - net.offset[i]) * net.scale[i];
-        dx[i] = along[i] * net.scale[i];
-    }
-    end_inputs(x, net.layers[0].inputs);
+    scale_inputs(net, in, x);
+    for (std::size_t i = 0; i < net.layers[0].inputs; ++i) dx[i] = along[i] * net.scale[i];
     end_inputs(dx, net.layers[0].inputs);
     for (std::size_t k = 0; k < net.count; ++k) {
         const GuardLayer& layer = net.layers[k];
@@ -380,10 +383,7 @@ double guard_gradient(const GuardLayers& net, const double* in, double* gradient
     GuardBuffer rates[GuardNetwork::max_layers];
     double* x = a.values;
     double* y = b.values;
-    for (std::size_t i = 0; i < net.layers[0].inputs; ++i) {
-        x[i] = (in[i] - net.offset[i]) * net.scale[i];
-    }
-    end_inputs(x, net.layers[0].inputs);
+    scale_inputs(net, in, x);
     for (std::size_t k = 0; k < net.count; ++k) {
         const GuardLayer& layer = net.layers[k];
         affine<Activation, 1, false, 8>(net, k, {x}, {y});

@@ -127,33 +127,8 @@ void check_shapes(const Model& model, const Refuse& refuse)
 {
     const auto number = [](std::size_t value) { return std::to_string(value); };
     const std::size_t count = model.layers.size();
-    if (count == 0 || count > GuardNetwork::max_layers) {
-        refuse("expected 1 to " + number(GuardNetwork::max_layers) + " layers, found " +
-               number(count));
-    }
-    for (std::size_t k = 0; k < count; ++k) {
-        const DenseLayer& layer = model.layers[k];
-        const std::string here = "layer " + number(k);
-        for (const std::size_t width : {layer.inputs, layer.outputs}) {
-            if (width == 0 || width > GuardNetwork::max_width) {
-                refuse(here + ": expected a width from 1 to " + number(GuardNetwork::max_width) +
-                       ", found " + number(width));
-            }
-        }
-        if (layer.weight.size() != layer.inputs * layer.outputs) {
-            refuse(here + ": expected " + number(layer.outputs) + " x " + number(layer.inputs) +
-                   " weights, found " + number(layer.weight.size()));
-        }
-        if (layer.bias.size() != layer.outputs) {
-            refuse(here + ": expected " + number(layer.outputs) + " biases, found " +
-                   number(layer.bias.size()));
-        }
-        if (k > 0 && layer.inputs != model.layers[k - 1].outputs) {
-            refuse(here + ": expected " + number(model.layers[k - 1].outputs) +
-                   " inputs, as many as the layer before has outputs, found " +
-                   number(layer.inputs));
-        }
-    }
+    detail::check_layers(model, refuse.who,
+                         {.layers = GuardNetwork::max_layers, .width = GuardNetwork::max_width});
     if (model.layers.back().outputs != 1) {
         refuse("expected 1 output, found " + number(model.layers.back().outputs));
     }

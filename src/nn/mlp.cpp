@@ -92,22 +92,22 @@ InstructionSet best_instruction_set() noexcept
     return best;
 }
 
-void detail::check_layers(const Model& model, std::string_view who)
+void detail::check_layers(const Model& model, std::string_view who, const LayerLimits& limits)
 {
     const Refuse refuse{who};
     const auto number = [](std::size_t value) { return std::to_string(value); };
-    constexpr std::size_t max_layers = Mlp<float>::max_layers;
-    static_assert(Mlp<float>::max_width == max_width);
-    if (model.layers.empty() || model.layers.size() > max_layers) {
-        refuse("expected 1 to " + number(max_layers) + " layers, found " +
+    static_assert(Mlp<float>::max_width == LayerLimits{}.width &&
+                  Mlp<float>::max_layers == LayerLimits{}.layers);
+    if (model.layers.empty() || model.layers.size() > limits.layers) {
+        refuse("expected 1 to " + number(limits.layers) + " layers, found " +
                number(model.layers.size()));
     }
     for (std::size_t k = 0; k < model.layers.size(); ++k) {
         const DenseLayer& layer = model.layers[k];
         const std::string here = "layer " + number(k);
         for (const std::size_t width : {layer.inputs, layer.outputs}) {
-            if (width == 0 || width > max_width) {
-                refuse(here + ": expected a width from 1 to " + number(max_width) + ", found " +
+            if (width == 0 || width > limits.width) {
+                refuse(here + ": expected a width from 1 to " + number(limits.width) + ", found " +
                        number(width));
             }
         }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "ricochet/systems/descriptor.hpp"
+#include "spring_mass.hpp"
 
 namespace ricochet {
 
@@ -54,16 +55,8 @@ const SystemDescriptor& CoulombOscillator::descriptor()
         .description = "A mass on a spring comes to rest under dry friction after a few turns.",
         .equations = {"slipping: mass u'' = -stiffness u - friction sign(v)",
                       "sticking: u'' = 0 while stiffness |u| <= static-friction"},
-        .parameters = {{.name = "mass",
-                        .initial = Parameters{}.mass,
-                        .unit = "kg",
-                        .range = {.lower = 0},
-                        .meaning = "of the oscillator"},
-                       {.name = "stiffness",
-                        .initial = Parameters{}.stiffness,
-                        .unit = "N/m",
-                        .range = {.lower = 0},
-                        .meaning = "of the spring"},
+        .parameters = {detail::mass_of_oscillator(Parameters{}.mass),
+                       detail::stiffness_of_spring(Parameters{}.stiffness),
                        {.name = "friction",
                         .initial = Parameters{}.friction,
                         .unit = "N",
@@ -74,18 +67,7 @@ const SystemDescriptor& CoulombOscillator::descriptor()
                         .unit = "N",
                         .range = {.lower = 0, .lower_included = true},
                         .meaning = "that sticking bears, at least friction"}},
-        .state = {{.name = "u",
-                   .unit = "m",
-                   .meaning = "position",
-                   .title = "position",
-                   .start = start[0],
-                   .start_meaning = "at the start"},
-                  {.name = "v",
-                   .unit = "m/s",
-                   .meaning = "velocity",
-                   .title = "velocity",
-                   .start = start[1],
-                   .start_meaning = "at the start"}},
+        .state = detail::position_and_velocity(start),
         .events = {"stop", "pulled left", "pulled right"},
         .t_end = 10,
         .comparison_step = 0.01,

@@ -1,6 +1,7 @@
 #include "ricochet/systems/stick_slip.hpp"
 
 #include "ricochet/systems/descriptor.hpp"
+#include "spring_mass.hpp"
 
 namespace ricochet {
 
@@ -17,16 +18,8 @@ const SystemDescriptor& StickSlip::descriptor()
         .equations = {"slipping: mass u'' = -stiffness u - F(s) sign(v - belt-speed),",
                       "    F(s) = friction / (1 + weakening s),  s = |v - belt-speed|",
                       "sticking: u' = belt-speed while stiffness |u| <= friction"},
-        .parameters = {{.name = "mass",
-                        .initial = Parameters{}.mass,
-                        .unit = "kg",
-                        .range = {.lower = 0},
-                        .meaning = "of the oscillator"},
-                       {.name = "stiffness",
-                        .initial = Parameters{}.stiffness,
-                        .unit = "N/m",
-                        .range = {.lower = 0},
-                        .meaning = "of the spring"},
+        .parameters = {detail::mass_of_oscillator(Parameters{}.mass),
+                       detail::stiffness_of_spring(Parameters{}.stiffness),
                        {.name = "belt-speed",
                         .initial = Parameters{}.belt_speed,
                         .unit = "m/s",
@@ -42,18 +35,7 @@ const SystemDescriptor& StickSlip::descriptor()
                         .unit = "s/m",
                         .range = {.lower = 0, .lower_included = true},
                         .meaning = "of friction with the sliding speed"}},
-        .state = {{.name = "u",
-                   .unit = "m",
-                   .meaning = "position",
-                   .title = "position",
-                   .start = start[0],
-                   .start_meaning = "at the start"},
-                  {.name = "v",
-                   .unit = "m/s",
-                   .meaning = "velocity",
-                   .title = "velocity",
-                   .start = start[1],
-                   .start_meaning = "at the start"}},
+        .state = detail::position_and_velocity(start),
         .events = {"stick", "slip left", "slip right"},
         .t_end = 40,
         .comparison_step = 0.01,

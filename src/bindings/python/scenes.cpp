@@ -323,17 +323,24 @@ template <class Of>
                     "alone"_a = s.alone, "groups"_a = s.groups);
 }
 
-[[nodiscard]] py::dict simulated(const PyScene& of, const py::dict& given)
+/// Runs a scene while other threads of Python go on.
+[[nodiscard]] SceneRun run_without_lock(const Scene& scene, SceneOptions& options)
 {
-    SceneOptions options = options_for(of, given);
     Background<int> background(nullptr);
     options.cancelled = &background.stopped();
     SceneRun run;
-    background.run([&] { run = simulate(of.scene, options); });
+    background.run([&] { run = simulate(scene, options); });
     if (background.raised()) {
         background.raised()->restore();
         throw py::error_already_set();
     }
+    return run;
+}
+
+[[nodiscard]] py::dict simulated(const PyScene& of, const py::dict& given)
+{
+    SceneOptions options = options_for(of, given);
+    const SceneRun run = run_without_lock(of.scene, options);
     using namespace py::literals;
     const std::size_t bodies = of.scene.bodies().size();
     std::vector<std::vector<BodyState>> last{run.bodies};
@@ -361,14 +368,7 @@ template <class Of>
         if (!std::isnan(lengths[s])) measure.length_of(SurfaceId{s}, lengths[s]);
     }
     options.observe = [&](const SceneEvent& event) { measure.add(event); };
-    Background<int> background(nullptr);
-    options.cancelled = &background.stopped();
-    SceneRun run;
-    background.run([&] { run = simulate(of.scene, options); });
-    if (background.raised()) {
-        background.raised()->restore();
-        throw py::error_already_set();
-    }
+    const SceneRun run = run_without_lock(of.scene, options);
     using namespace py::literals;
     const SceneMeasures found = measure.result();
     const auto pair = [](const Measured& m) { return std::pair(m.mean, m.error); };

@@ -11,10 +11,16 @@
 
 namespace ricochet::detail {
 
-/// @throws std::invalid_argument in the name of `who` if the model has no layer or
-/// more than 64, if a width is zero or above 256, if the inputs of a layer are not the
-/// outputs of the one before it, or if the number of weights or biases does not match its shape.
-void check_layers(const Model& model, std::string_view who);
+/// How large a network may be.
+struct LayerLimits {
+    std::size_t layers = 64;
+    std::size_t width = max_width;  ///< of each layer and of the input
+};
+
+/// @throws std::invalid_argument in the name of `who` if the model has no layer or more than the
+/// limit, if a width is zero or above its limit, if the inputs of a layer are not the outputs of
+/// the one before it, or if the number of weights or biases does not match its shape.
+void check_layers(const Model& model, std::string_view who, const LayerLimits& limits = {});
 
 namespace RICOCHET_KERNEL_NAMESPACE {
 
