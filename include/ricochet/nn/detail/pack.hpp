@@ -14,7 +14,7 @@ namespace ricochet::detail {
 /// How large a network may be.
 struct LayerLimits {
     std::size_t layers = 64;
-    std::size_t width = max_width;  ///< of each layer and of the input
+    std::size_t width = 256;  ///< of each layer and of the input
 };
 
 /// @throws std::invalid_argument in the name of `who` if the model has no layer or more than the
