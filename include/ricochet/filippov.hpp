@@ -405,8 +405,8 @@ public:
         return detail::times_of(fields());
     }
     template <StateVector X>
-    [[nodiscard]] double next_time_event(double t,
-                                         const X& x) const requires detail::PlainTimer<Fields, X>
+    [[nodiscard]] double next_time_event(double t, const X& x) const
+        requires(detail::timer_form<Fields, X> == detail::Form::plain)
     {
         return fields().next_time_event(t, x);
     }

@@ -1,5 +1,7 @@
-// The result of a detector for a step.
+// What a detector is, and its result for a step.
 #pragma once
+
+#include <concepts>
 
 #include "ricochet/detail/guard_view.hpp"
 #include "ricochet/guard.hpp"
@@ -83,3 +85,45 @@ struct Finding {
 };
 
 }  // namespace ricochet::detail
+
+namespace ricochet {
+
+class GuardPath;
+
+/// Decides whether a guard has an event in a step, and in which part of it.
+///
+///     uses_rates          whether it reads the rates of guards at the ends of a step
+///     evidence            of "no event" in a step that it does not suspect
+///     suspects(sign, start, end)               whether a step has to be examined, by the samples
+///                         of the guard at its ends; times `sign` it is positive where it is armed
+///     leaves_plainly(sign, start, end, touch)  whether an interval holds one crossing and nothing
+///                         else, as far as its ends tell; then it is not examined
+///     examine(path, watch)                     the first event of the interval, or "clear" with
+///                         its evidence; sets `side_after`
+///
+/// A detector is a value without state that changes: several threads may use it. `screening`,
+/// `checks_inside` and `check(system, x, smallest, largest)` are optional.
+/// `tests/conformance/detectors.hpp` tests what is promised here.
+template <class D>
+concept Detector = std::copy_constructible<D> &&
+    requires(const D& detector, double sign, const GuardSample& sample, GuardPath& path,
+             detail::Watch& watch)
+{
+    {
+        D::uses_rates
+        } -> std::convertible_to<bool>;
+    {
+        D::evidence
+        } -> std::convertible_to<Evidence>;
+    {
+        D::suspects(sign, sample, sample)
+        } -> std::convertible_to<bool>;
+    {
+        D::leaves_plainly(sign, sample, sample, sign)
+        } -> std::convertible_to<bool>;
+    {
+        detector.examine(path, watch)
+        } -> std::same_as<detail::Finding>;
+};
+
+}  // namespace ricochet

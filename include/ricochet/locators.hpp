@@ -1,9 +1,24 @@
 // Locators: they find where in a bracket a guard leaves its side.
 #pragma once
 
+#include <concepts>
+
 #include "ricochet/step_probe.hpp"
 
 namespace ricochet {
+
+/// Finds where a guard leaves its side: `locate(path, lo, hi, tolerance)` narrows the bracket
+/// from `lo`, where the guard is on its side, to `hi`, where it is not, until it is no wider than
+/// `tolerance` [s] or its ends are neighbouring doubles. It evaluates the guard inside the bracket
+/// alone, and returns the ends that it has come to.
+template <class L>
+concept Locator = std::copy_constructible<L> &&
+    requires(const L& locator, GuardPath& path, const GuardSample& sample, double tolerance)
+{
+    {
+        locator.locate(path, sample, sample, tolerance)
+        } -> std::same_as<detail::Location>;
+};
 
 // Bisection on the step's own map: the simplest locator, and the one of the source paper.
 

@@ -19,6 +19,15 @@ struct explicit_error_stepper_fsal_tag;
 
 namespace ricochet {
 
+/// A one-step method: names the stepper that takes its steps, for each type of state. That is a
+/// `detail::RungeKutta` of a tableau, a stepper of odeint, or one with `order()` and odeint's
+/// `do_step`. It keeps nothing from one step to the next, since an event may lie between them.
+template <class M>
+concept Method = requires
+{
+    typename M::template Stepper<std::array<double, 1>>;
+};
+
 /// Method made of a complete stepper type for one state type, odeint's (see `ricochet/odeint.hpp`)
 /// or the user's own, with odeint's `do_step`. It must be a one-step method: a multistep method
 /// keeps earlier steps, which an event makes invalid. Its form is in `ricochet/odeint.hpp`.

@@ -48,6 +48,10 @@ class RunComponents {
     static constexpr bool error_controlled = std::is_same_v<Stepping, ErrorControlled<Method>>;
     static constexpr bool by_name = std::is_same_v<Method, MethodByName>;
 
+    static_assert(by_name || ricochet::Method<Method>,
+                  "ricochet: found stepping by a type that is no method; expected one with "
+                  "template <class State> using Stepper, such as ThisStepper<S>");
+
     static_assert([] {
         // A system without a flow has been refused already.
         if constexpr (Flowing<System, X> && StateVector<X>) return check_declarations<System, X>();

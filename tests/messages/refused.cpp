@@ -310,6 +310,15 @@ int main()
 #elif CASE == 28 || CASE == 29
     EventMonitor monitor(falling, x0);
     return static_cast<int>(monitor.examine(Step(Instant{0}, 1, x0, x0, x0, x0)));
+// CASE 54 alone: found a detector that does not have the members of one; expected those
+#elif CASE == 54
+    (void)integrate(falling, x0, {.t_end = 1}, FixedStep<Rk4>{}, Rk4{});
+// CASE 55: found a locator without locate(GuardPath&, GuardSample, GuardSample, double) const
+#elif CASE == 55
+    (void)integrate(falling, x0, {.t_end = 1}, FixedStep<Rk4>{}, Extremum{}, Rk4{});
+// CASE 56: found stepping by a type that is no method; expected one with template <class State>
+#elif CASE == 56
+    (void)integrate(falling, x0, {.t_end = 1}, FixedStep<Extremum>{});
 // CASE 30 alone: found a detector that may miss events in Metered; expected one that keeps them all
 #elif CASE == 30
     const auto measure = [](const Calibrated<>& gate) {

@@ -212,6 +212,21 @@ concept TakesModeBeforeWhich =
     !Name::template takes<const System, Only<std::size_t>, Only<Mode>, Rest...> &&
     Name::template takes<const System, Only<Mode>, Only<std::size_t>, Rest...>;
 
+/// Whether a function that has a form takes a state of this type, which may be a copy.
+template <class Name, Form form, class System, class State, class... Middle>
+[[nodiscard]] constexpr bool takes_state() noexcept
+{
+    if constexpr (form == Form::of_guard_in_mode) {
+        return Name::template takes<const System, std::size_t, Middle..., Mode, double, State>;
+    } else if constexpr (form == Form::of_guard) {
+        return Name::template takes<const System, std::size_t, Middle..., double, State>;
+    } else if constexpr (form == Form::in_mode) {
+        return Name::template takes<const System, Middle..., Mode, double, State>;
+    } else {
+        return form == Form::plain && Name::template takes<const System, Middle..., double, State>;
+    }
+}
+
 /// A mode and the number of a guard convert into each other, so either can be taken for the
 /// other. `counted` and `moded` state the form in which the function is used.
 template <class Name, class System, class X, bool counted, bool moded, class... Rest>
@@ -254,7 +269,7 @@ template <class System, class X>
         return unfit<Name_guard, System, X>();
     } else {
         return told_apart < Name_guard, System, X,
-               PlainGuardOf<System, X> && !ModedGuardOf<System, X>, ModedSingleGuard<System, X>,
+               guard_form<System, X> == Form::of_guard, guard_form<System, X> == Form::in_mode,
                double, const X& > ();
     }
 }
@@ -276,8 +291,8 @@ template <class System, class X>
         return unfit<Name_guard_rate, System, X>();
     } else {
         return told_apart < Name_guard_rate, System, X,
-               PlainRateOf<System, X, X> && !ModedRateOf<System, X, X>,
-               ModedSingleRate<System, X, X>, double, const X&, const X& > ();
+               rate_form<System, X> == Form::of_guard,
+               rate_form<System, X> == Form::in_mode, double, const X&, const X& > ();
     }
 }
 
@@ -324,30 +339,18 @@ template <class System, class X>
     } else if constexpr (!Resetting<System, X>) {
         return unfit<Name_reset, System, X>();
     } else if constexpr (DirectedReset<System, X>) {
-        constexpr bool copies =
-            Name_reset::takes<const System, Crossing, double, X> ||
-            Name_reset::takes<const System, std::size_t, Crossing, double, X> ||
-            Name_reset::takes<const System, Crossing, Mode, double, X> ||
-            Name_reset::takes<const System, std::size_t, Crossing, Mode, double, X>;
-        return copies ? Declaration::by_value : Declaration::fits;
-    } else if constexpr ((PlainSingleReset<System, X> &&
-                          Name_reset::takes<const System, double, X>) ||
-                         (PlainResetOf<System, X> &&
-                          Name_reset::takes<const System, std::size_t, double, X>) ||
-                         (ModedSingleReset<System, X> &&
-                          Name_reset::takes<const System, Mode, double, X>) ||
-                         (ModedResetOf<System, X> &&
-                          Name_reset::takes<const System, std::size_t, Mode, double, X>) ||
-                         (PlainSetReset<System, X> &&
-                          Name_reset::takes<const System, const FiredGuards&, double, X>) ||
-                         (ModedSetReset<System, X> &&
-                          Name_reset::takes<const System, const FiredGuards&, Mode, double, X>)) {
+        return takes_state<Name_reset, directed_reset_form<System, X>, System, X, Crossing>()
+                   ? Declaration::by_value
+                   : Declaration::fits;
+    } else if constexpr (takes_state<Name_reset, reset_form<System, X>, System, X>() ||
+                         takes_state<Name_reset, set_reset_form<System, X>, System, X,
+                                     const FiredGuards&>()) {
         return Declaration::by_value;
     } else if constexpr (ResetsTogether<System, X>) {
         return Declaration::fits;
     } else {
         return told_apart < Name_reset, System, X,
-               PlainResetOf<System, X> && !ModedResetOf<System, X>, ModedSingleReset<System, X>,
+               reset_form<System, X> == Form::of_guard, reset_form<System, X> == Form::in_mode,
                double, X& > ();
     }
 }
@@ -361,20 +364,13 @@ template <class System, class X>
         return Declaration::absent;
     } else if constexpr (!Resting<System, X>) {
         return unfit<Name_rest, System, X>();
-    } else if constexpr ((PlainSingleRest<System, X> &&
-                          Name_rest::takes<const System, double, X>) ||
-                         (PlainRestOf<System, X> &&
-                          Name_rest::takes<const System, std::size_t, double, X>) ||
-                         (ModedSingleRest<System, X> &&
-                          Name_rest::takes<const System, Mode, double, X>) ||
-                         (ModedRestOf<System, X> &&
-                          Name_rest::takes<const System, std::size_t, Mode, double, X>)) {
+    } else if constexpr (takes_state<Name_rest, rest_form<System, X>, System, X>()) {
         return Declaration::by_value;
     } else if constexpr (!Resetting<System, X>) {
         return Declaration::does_not_fit;
     } else {
-        return told_apart < Name_rest, System, X, PlainRestOf<System, X> && !ModedRestOf<System, X>,
-               ModedSingleRest<System, X>, double, X& > ();
+        return told_apart < Name_rest, System, X, rest_form<System, X> == Form::of_guard,
+               rest_form<System, X> == Form::in_mode, double, X& > ();
     }
 }
 
@@ -389,12 +385,8 @@ template <class System, class X>
     } else if constexpr (EnabledIn<System> && TakesModeBeforeWhich<Name_enabled, System>) {
         return Declaration::mode_before_which;
     } else if constexpr (CountsGuards<System> && EnabledAt<System, X>) {
-        return told_apart < Name_enabled, System, X,
-               !requires(const System& system, std::size_t which, Mode mode, double t, const X& x)
-        {
-            system.enabled(which, mode, t, x);
-        }
-        , false, double, const X& > ();
+        return told_apart<Name_enabled, System, X, enabled_form<System, X> == Form::of_guard, false,
+                          double, const X&>();
     } else {
         return Declaration::fits;
     }

@@ -36,19 +36,12 @@ struct OwnEvents : Fields {
 
 /// At least one function takes a mode.
 template <class Own, class X>
-concept TakesModes = Moded<Own, X> || ModedGuardOf<Own, X> || ModedGuards<Own, X> ||
-    ModedSingleGuard<Own, X> || ModedRateOf<Own, X, X> || ModedSingleRate<Own, X, X> ||
-    ModedRates<Own, X> || ModedSetReset<Own, X> || ModedResetOf<Own, X> ||
-    ModedSingleReset<Own, X> || ModedDirectedResetOf<Own, X> || ModedDirectedReset<Own, X> ||
-    ModedRestOf<Own, X> || ModedSingleRest<Own, X> || EnabledIn<Own> || ModedTimer<Own, X> ||
-    requires(const Own& own, Mode mode, double t, X& x)
-{
-    own.time_reset(mode, t, x);
-} || requires(const Own& own, std::size_t which, Mode mode, double t, const X& x)
-{
-    own.enabled(which, mode, t, x);
-} ||(!CountsGuards<Own> &&
-     requires(const Own& own, Mode mode, double t, const X& x) { own.enabled(mode, t, x); });
+concept TakesModes = Moded<Own, X> || takes_mode(guard_form<Own, X>) ||
+    takes_mode(guards_form<Own, X>) || takes_mode(rate_form<Own, X>) ||
+    takes_mode(rates_form<Own, X>) || takes_mode(set_reset_form<Own, X>) ||
+    takes_mode(reset_form<Own, X>) || takes_mode(directed_reset_form<Own, X>) ||
+    takes_mode(rest_form<Own, X>) || EnabledIn<Own> || takes_mode(enabled_form<Own, X>) ||
+    takes_mode(timer_form<Own, X>) || takes_mode(time_reset_form<Own, X>);
 
 template <class Fields>
 concept DeclaresState = requires

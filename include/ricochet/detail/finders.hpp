@@ -147,8 +147,11 @@ public:
         static_assert(!is_locator,
                       "ricochet: found a locator in the place of the detector; expected stepping, "
                       "detector, locator");
+        static_assert(is_locator || ricochet::Detector<Detector>,
+                      "ricochet: found a detector that does not have the members of one; expected "
+                      "those of the concept Detector, in ricochet/finding.hpp");
         DetectorTable<C> table;
-        if constexpr (!is_locator) fill(table, detector);
+        if constexpr (ricochet::Detector<Detector>) fill(table, detector);
         return table;
     }
 };
@@ -156,6 +159,9 @@ public:
 template <class Locator>
 [[nodiscard]] LocatorTable locator_table() noexcept
 {
+    static_assert(ricochet::Locator<Locator>,
+                  "ricochet: found a locator without locate(GuardPath&, GuardSample, GuardSample, "
+                  "double) const; expected one that returns a Location");
     return {.type = written_type<Locator>(),
             .locate = [](const void* self, GuardPath& path, const GuardSample& lo,
                          const GuardSample& hi, double tolerance) -> Location {
