@@ -15,6 +15,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -69,6 +70,7 @@ struct BernsteinTask {
 /// for the polynomial through the guard's samples if they are rounded to four units in the last
 /// place of the largest and the declared degree is right. Costs steps without dense output.
 struct Bernstein {
+    static constexpr std::string_view name = "bernstein";
     static constexpr bool uses_rates = true;
     static constexpr detail::Screening screening = detail::Screening::every;
     static constexpr Evidence evidence = Evidence::proved;  ///< for steps without armed guards

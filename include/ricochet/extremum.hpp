@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <string_view>
 
 #include "ricochet/detail/arithmetic.hpp"
 #include "ricochet/step_probe.hpp"
@@ -16,6 +17,7 @@ namespace ricochet {
 /// Detector that compares the signs of a guard at both ends of a step, at one guard call a step.
 /// Two crossings within one step cancel and are not found.
 struct Ends {
+    static constexpr std::string_view name = "ends";
     static constexpr bool uses_rates = false;
     static constexpr detail::Screening screening = detail::Screening::ends;
     static constexpr Evidence evidence = Evidence::assumed;  ///< evidence for a step not suspected
@@ -72,6 +74,7 @@ private:
 /// Detector that evaluates a guard at both ends of a step and once inside, compares it with the
 /// cubic through values and rates, and searches for extrema if that leaves doubts: the default.
 struct Extremum {
+    static constexpr std::string_view name = "extremum";
     static constexpr bool uses_rates = true;
     static constexpr detail::Screening screening = detail::Screening::extremum;
     static constexpr bool checks_inside = true;  ///< compares each step with the cubic of its ends

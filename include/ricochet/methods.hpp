@@ -142,29 +142,37 @@ inline constexpr bool has_interpolant = requires(const Stepper& stepper, X& x)
 template <Departing Stepper, class X>
 inline constexpr bool has_interpolant<Stepper, X> = Stepper::has_dense_output;
 
-template <class... Methods>
-struct MethodList {
-    static constexpr std::size_t size = sizeof...(Methods);
+template <class... Types>
+struct TypeList {
+    static constexpr std::size_t size = sizeof...(Types);
 
-    /// The place of a method; `size` if it is not in the list.
-    template <class Method>
+    /// The place of a type; `size` if it is not in the list.
+    template <class Type>
     [[nodiscard]] static constexpr std::size_t place() noexcept
     {
         std::size_t place = 0;
-        (void)((std::is_same_v<Method, Methods> || (++place, false)) || ...);
+        (void)((std::is_same_v<Type, Types> || (++place, false)) || ...);
         return place;
     }
 
-    /// An array of what `make.operator()<Method>()` returns.
+    /// An array of what `make.operator()<Type>()` returns.
     template <class Make>
     [[nodiscard]] static constexpr auto each(const Make& make)
     {
-        return std::array{make.template operator()<Methods>()...};
+        return std::array{make.template operator()<Types>()...};
+    }
+
+    /// Calls `use.operator()<Type>()` with the type at a place; false if the list ends before it.
+    template <class Use>
+    static constexpr bool at(std::size_t place, const Use& use)
+    {
+        std::size_t i = 0;
+        return ((i++ == place && (use.template operator()<Types>(), true)) || ...);
     }
 };
 
 /// The methods of `MethodName`, in its order. Every table of methods is made from this list.
-using NamedMethods = MethodList<Euler, Rk4, CashKarp54, Dopri5, Fehlberg78>;
+using NamedMethods = TypeList<Euler, Rk4, CashKarp54, Dopri5, Fehlberg78>;
 
 /// One of the library's own methods, which is also compiled in the library.
 template <class Method>

@@ -21,6 +21,7 @@
 #include "joined.hpp"
 #include "options.hpp"
 #include "report.hpp"
+#include "ricochet/detail/named_detectors.hpp"
 #include "ricochet/nn/model.hpp"
 #include "say.hpp"
 
@@ -178,8 +179,8 @@ void add_run_options(CLI::App& command, RunRequest& run)
     add_text(command, "--mode", run.mode, "NAME",
              "mode at the start, where the system has modes; default: the system's");
     add_text(command, "--detector", run.detector, "NAME",
-             "ends, extremum (default), bernstein, network (default with --model), line, verified, "
-             "certified or calibrated");
+             "extremum (default), another of " + ricochet::detail::spelled_detectors() +
+                 ", network (default with --model), line, verified, certified or calibrated");
     add_text(command, "--gate", run.gate, "NAME",
              "how far a model that clears several steps is trusted: verified (not at all), "
              "certified (where it has been proved right) or calibrated (by name only: events may "

@@ -10,6 +10,7 @@
 #include "interrupt.hpp"
 #include "model_lookup.hpp"
 #include "registry.hpp"
+#include "ricochet/detail/named_detectors.hpp"
 
 namespace ricochet::app {
 
@@ -21,14 +22,20 @@ constexpr std::uint64_t default_max_steps = 2'000'000;
 template <class Kind, std::size_t n>
 using Names = std::array<std::pair<std::string_view, Kind>, n>;
 
-constexpr Names<DetectorKind, 8> detectors{{{"ends", DetectorKind::ends},
-                                            {"extremum", DetectorKind::extremum},
-                                            {"bernstein", DetectorKind::bernstein},
-                                            {"network", DetectorKind::network},
-                                            {"verified", DetectorKind::verified},
-                                            {"line", DetectorKind::line},
-                                            {"certified", DetectorKind::certified},
-                                            {"calibrated", DetectorKind::calibrated}}};
+constexpr auto detectors = [] {
+    constexpr Names<DetectorKind, 5> more{{{"network", DetectorKind::network},
+                                           {"verified", DetectorKind::verified},
+                                           {"line", DetectorKind::line},
+                                           {"certified", DetectorKind::certified},
+                                           {"calibrated", DetectorKind::calibrated}}};
+    constexpr std::size_t n = ricochet::detail::NamedDetectors::size;
+    Names<DetectorKind, n + more.size()> all{};
+    for (std::size_t i = 0; i < n; ++i) {
+        all[i] = {ricochet::detail::detector_names[i], static_cast<DetectorKind>(i)};
+    }
+    for (std::size_t i = 0; i < more.size(); ++i) all[n + i] = more[i];
+    return all;
+}();
 constexpr Names<LocatorKind, 3> locators{{{"newton", LocatorKind::newton},
                                           {"bisection", LocatorKind::bisection},
                                           {"toms748", LocatorKind::toms748}}};
@@ -221,10 +228,9 @@ void choose_detector(const SystemEntry& system, const RunRequest& request, RunSe
         return;
     }
     if (system.models.empty()) {
-        throw BadInput(
-            fmt::format("the detector {} needs a network, and none can be used with {}; expected "
-                        "ends, extremum or bernstein",
-                        name(settings.detector), system.name));
+        throw BadInput(fmt::format(
+            "the detector {} needs a network, and none can be used with {}; expected {}",
+            name(settings.detector), system.name, ricochet::detail::spelled_detectors()));
     }
     FoundModel found = request.model ? named_model(system, settings, *request.model)
                                      : suitable_model(system, settings);

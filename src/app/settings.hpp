@@ -23,11 +23,13 @@ namespace ricochet::app {
 
 struct SystemEntry;
 
-enum class DetectorKind {
-    ends,
+/// A detector: one of `detail::NamedDetectors` by its place in that list, or one that needs a model
+/// or a guard of a certain form.
+enum class DetectorKind : std::uint8_t {
     extremum,
+    ends,
     bernstein,
-    network,
+    network = 128,
     verified,
     line,
     certified,
@@ -84,7 +86,7 @@ struct RunSettings {
     Options options;
     Stepper stepper = MethodName::dopri5;
     bool fixed_step = false;  ///< else error control
-    DetectorKind detector = DetectorKind::extremum;
+    DetectorKind detector{};  ///< the first of the list
     LocatorKind locator = LocatorKind::newton;
     std::optional<BareNetwork> network{};  ///< of the detectors `network` and `verified`
     std::optional<Model> gate{};           ///< of `certified` and `calibrated`, and of `verified`

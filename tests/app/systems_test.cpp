@@ -359,9 +359,9 @@ TEST_F(App, ScenesWithExpensiveGuardsMeetThem)
 TEST_F(App, SystemsWithoutNetworksRefuseThem)
 {
     expect_refused({"simulate", "pendulum", "--detector", "network"},
-                   {"network", "pendulum", "ends, extremum or bernstein"});
+                   {"network", "pendulum", "extremum, ends or bernstein"});
     expect_refused({"simulate", "pendulum", "--model", "bouncing-ball"},
-                   {"network", "pendulum", "ends, extremum or bernstein"});
+                   {"network", "pendulum", "extremum, ends or bernstein"});
     expect_refused({"simulate", "thermostat", "--detector", "verified"},
                    {"verified", "thermostat"});
     expect_refused({"simulate", "thermostat", "--detector", "line"}, {"line", "thermostat"});

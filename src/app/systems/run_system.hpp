@@ -12,9 +12,8 @@
 #include "../registry.hpp"
 #include "app/ballistic_line.hpp"
 #include "has_series.hpp"
-#include "ricochet/bernstein.hpp"
 #include "ricochet/detail/features.hpp"
-#include "ricochet/extremum.hpp"
+#include "ricochet/detail/named_detectors.hpp"
 #include "ricochet/gates.hpp"
 #include "ricochet/integrate.hpp"
 #include "ricochet/locators.hpp"
@@ -99,12 +98,12 @@ TimedRun with_detector(const RunSettings& settings, Use&& use)
             return use(chosen<System, X>(BallisticLine{}));
         }
     }
-    switch (settings.detector) {
-        case DetectorKind::ends: return use(chosen<System, X>(Ends{}));
-        case DetectorKind::bernstein: return use(chosen<System, X>(Bernstein{}));
-        case DetectorKind::extremum: return use(chosen<System, X>(Extremum{}));
-        default: throw std::logic_error("the system has no such detector");
-    }
+    TimedRun run;
+    const bool found = ricochet::detail::NamedDetectors::at(
+        static_cast<std::size_t>(settings.detector),
+        [&]<class Detector>() { run = use(chosen<System, X>(Detector{})); });
+    if (!found) throw std::logic_error("the system has no such detector");
+    return run;
 }
 
 /// The same run with one type of state for all systems; without its dense solution, which

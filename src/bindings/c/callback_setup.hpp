@@ -7,10 +7,8 @@
 
 #include "bindings/c/callback_table.hpp"
 #include "bindings/c/options.hpp"
-#include "ricochet/bernstein.hpp"
 #include "ricochet/detail/core.hpp"
 #include "ricochet/detail/finders.hpp"
-#include "ricochet/extremum.hpp"
 #include "ricochet/gates.hpp"
 #include "ricochet/locators.hpp"
 #include "ricochet/nn/model.hpp"
@@ -81,14 +79,15 @@ template <class X>
 void CallbackSetup<X>::set_detector(const FinderOptions& finders)
 {
     const auto gate = [&] { return gates::Gate(load_model(finders.gate)); };
+    const bool is_named = detail::NamedDetectors::at(
+        place_of(finders.detector), [&]<class Detector>() { set_detector(Detector()); });
+    if (is_named) return;
     switch (finders.detector) {
-        case RC_EXTREMUM: return set_detector(Extremum());
-        case RC_ENDS: return set_detector(Ends());
-        case RC_BERNSTEIN: return set_detector(Bernstein());
         case RC_PLANNED: return set_detector(Planned<>());
         case RC_CALIBRATED: return set_detector(Calibrated<>(gate()));
         case RC_CALIBRATED_BOUNDS: return set_detector(CalibratedBounds<>(gate()));
         case RC_FORESEEN: return set_detector(Foreseen<>(gate()));
+        default: return;
     }
 }
 

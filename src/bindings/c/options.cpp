@@ -27,16 +27,24 @@ constexpr std::array<Method, 5> methods{{
 }};
 static_assert(methods.size() == detail::named_methods.size());
 
-/// "RC_DOPRI5, RC_FEHLBERG78 or ...": those with an error estimate, or without one.
-[[nodiscard]] std::string spelled_methods(bool estimates)
+/// "A, B or C" of those that belong.
+template <class List, class Belongs>
+[[nodiscard]] std::string alternatives(const List& list, const Belongs& belongs)
 {
     std::string out, last;
-    for (const Method& each : methods) {
-        if (estimates_error(each.name) != estimates) continue;
+    for (const auto& each : list) {
+        if (!belongs(each)) continue;
         if (!last.empty()) out += out.empty() ? last : ", " + last;
         last = each.spelled;
     }
     return out + " or " + last;
+}
+
+/// "RC_DOPRI5, RC_FEHLBERG78 or ...": those with an error estimate, or without one.
+[[nodiscard]] std::string spelled_methods(bool estimates)
+{
+    return alternatives(
+        methods, [=](const Method& each) { return estimates_error(each.name) == estimates; });
 }
 
 template <class T>
@@ -143,7 +151,8 @@ public:
         FinderOptions finders{.detector = one_of("detector", from.detector, RC_FORESEEN),
                               .locator = one_of("locator", from.locator, RC_TOMS748),
                               .gate = {}};
-        const bool asks_gate = finders.detector >= RC_CALIBRATED;
+        const bool asks_gate =
+            place_of(finders.detector) == named_detectors.size() && finders.detector != RC_PLANNED;
         if (asks_gate && !from.gate) refuse("found no gate; expected the path of its model");
         if (!asks_gate && from.gate) refuse("found a gate for a detector that asks none");
         if (asks_gate) finders.gate = from.gate;
@@ -222,10 +231,10 @@ void require_options_of_phases(const RunOptions& options)
     if (options.fixed_step) {
         reader.refuse("found fixed_step = 1 and a system with set_valued; expected error control");
     }
-    if (options.finders.detector > RC_BERNSTEIN) {
+    if (place_of(options.finders.detector) == named_detectors.size()) {
         reader.refuse(
-            "detector: found one that defers checks and a system with set_valued; expected "
-            "RC_EXTREMUM, RC_ENDS or RC_BERNSTEIN");
+            "detector: found one that defers checks and a system with set_valued; expected " +
+            alternatives(named_detectors, [](const NamedDetector&) { return true; }));
     }
 }
 

@@ -1,13 +1,34 @@
 // Options as a C program gives them, checked.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <string>
 
 #include "bindings/c/error.hpp"
+#include "ricochet/detail/named_detectors.hpp"
 #include "ricochet/methods.hpp"
 #include "ricochet/options.hpp"
 
 namespace ricochet::c {
+
+/// The detectors of `detail::NamedDetectors`, in its order.
+struct NamedDetector {
+    rc_detector value;
+    const char* spelled;
+};
+inline constexpr std::array named_detectors{NamedDetector{RC_EXTREMUM, "RC_EXTREMUM"},
+                                            NamedDetector{RC_ENDS, "RC_ENDS"},
+                                            NamedDetector{RC_BERNSTEIN, "RC_BERNSTEIN"}};
+static_assert(named_detectors.size() == detail::NamedDetectors::size);
+
+/// The place in this list; its size for a detector that needs bounds or a gate.
+[[nodiscard]] constexpr std::size_t place_of(rc_detector detector) noexcept
+{
+    std::size_t place = 0;
+    while (place < named_detectors.size() && named_detectors[place].value != detector) ++place;
+    return place;
+}
 
 /// How events are detected and located.
 struct FinderOptions {

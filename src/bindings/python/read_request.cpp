@@ -3,7 +3,6 @@
 #include <pybind11/stl.h>
 
 #include <functional>
-#include <initializer_list>
 #include <map>
 #include <string>
 #include <string_view>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "network.hpp"
+#include "ricochet/detail/named_detectors.hpp"
 
 namespace py = pybind11;
 
@@ -26,7 +26,7 @@ namespace {
 }
 
 [[nodiscard]] std::string_view one_of(const std::string& name,
-                                      std::initializer_list<std::string_view> known)
+                                      const std::vector<std::string_view>& known)
 {
     for (const std::string_view candidate : known) {
         if (candidate == name) return candidate;
@@ -98,9 +98,14 @@ void set(Request& request, const py::handle& value)
          [](Request& request, const py::handle& value) { request.fixed = read_as<bool>(value); }},
         {"detector",
          [](Request& request, const py::handle& value) {
-             request.detector = one_of(read_as<std::string>(value),
-                                       {"extremum", "ends", "bernstein", "planned", "calibrated",
-                                        "calibrated-bounds", "foreseen", "certified", "network"});
+             static const std::vector<std::string_view> known = [] {
+                 std::vector<std::string_view> all(detail::detector_names.begin(),
+                                                   detail::detector_names.end());
+                 all.insert(all.end(), {"planned", "calibrated", "calibrated-bounds", "foreseen",
+                                        "certified", "network"});
+                 return all;
+             }();
+             request.detector = one_of(read_as<std::string>(value), known);
          }},
         {"gate",
          [](Request& request, const py::handle& value) {
@@ -108,8 +113,8 @@ void set(Request& request, const py::handle& value)
          }},
         {"locator",
          [](Request& request, const py::handle& value) {
-             request.locator =
-                 one_of(read_as<std::string>(value), {"newton", "bisection", "toms748"});
+             static const std::vector<std::string_view> known{"newton", "bisection", "toms748"};
+             request.locator = one_of(read_as<std::string>(value), known);
          }},
         {"record_steps",
          [](Request& request, const py::handle& value) {

@@ -6,9 +6,9 @@
 #include <string>
 #include <utility>
 
-#include "ricochet/bernstein.hpp"
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/kernels.hpp"
+#include "ricochet/detail/named_detectors.hpp"
 #include "ricochet/extremum.hpp"
 #include "ricochet/locators.hpp"
 #include "ricochet/planned.hpp"
@@ -43,7 +43,7 @@ void locate_by(detail::RunBindings<State>& setup)
     setup.locating = &locator;
 }
 
-[[noreturn]] void refuse(const char* option, std::string_view given, const char* expected)
+[[noreturn]] void refuse(const char* option, std::string_view given, const std::string& expected)
 {
     throw std::invalid_argument(std::string(option) + ": found '" + std::string(given) +
                                 "', expected " + expected);
@@ -56,15 +56,10 @@ void detect_without_gate(detail::RunBindings<State>& setup, const Request& reque
         throw std::invalid_argument("gate: found one for the detector '" + std::string(detector) +
                                     "', which asks none");
     }
-    if (detector == "extremum") {
-        detect_by<Extremum>(setup);
-    } else if (detector == "ends") {
-        detect_by<Ends>(setup);
-    } else if (detector == "bernstein") {
-        detect_by<Bernstein>(setup);
-    } else if (detector == "planned") {
+    if (detector == "planned") {
         detect_by<Planned<>>(setup);
-    } else {
+    } else if (!detail::NamedDetectors::at(detail::detector_place(detector),
+                                           [&]<class Detector>() { detect_by<Detector>(setup); })) {
         refuse("detector", detector, "one of those in the documentation");
     }
 }
@@ -92,10 +87,9 @@ RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunAdapter& ad
             "set_valued: found fixed steps, 'taylor' or 'rosenbrock4' beside it, expected " +
             detail::spelled_methods(true, "'") + " with error control");
     }
-    const bool checks = request.detector == "extremum" || request.detector == "ends" ||
-                        request.detector == "bernstein";
-    if (!checks)
-        refuse("detector", request.detector, "'extremum', 'ends' or 'bernstein' beside set_valued");
+    if (detail::detector_place(request.detector) == detail::NamedDetectors::size) {
+        refuse("detector", request.detector, detail::spelled_detectors("'") + " beside set_valued");
+    }
     detail::PhasedSetup<State> phases;
     phases.user = setup.setup;
     phases.method = request.method;

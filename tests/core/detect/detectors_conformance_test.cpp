@@ -1,9 +1,8 @@
 // Applies the common suite to every detector.
 #include "conformance/detectors.hpp"
 
-#include "ricochet/bernstein.hpp"
+#include "ricochet/detail/named_detectors.hpp"
 #include "ricochet/enclosed.hpp"
-#include "ricochet/extremum.hpp"
 #include "ricochet/gates.hpp"
 
 namespace ricochet::test::detectors_conformance_test {
@@ -46,6 +45,21 @@ std::vector<DetectorCase> all()
 
 INSTANTIATE_TEST_SUITE_P(All, DetectorSuite, testing::ValuesIn(all()),
                          [](const auto& info) { return info.param.name; });
+
+TEST(NamedDetectors, AreFoundByNamesOfTheirOwn)
+{
+    for (std::size_t i = 0; i < detail::detector_names.size(); ++i) {
+        EXPECT_EQ(detail::detector_place(detail::detector_names[i]), i);
+    }
+    EXPECT_EQ(detail::detector_place("network"), detail::NamedDetectors::size);
+    EXPECT_FALSE(detail::NamedDetectors::at(detail::NamedDetectors::size, []<class Detector>() {}));
+}
+
+TEST(NamedDetectors, AreListedByMessages)
+{
+    EXPECT_EQ(detail::spelled_detectors(), "extremum, ends or bernstein");
+    EXPECT_EQ(detail::spelled_detectors("'"), "'extremum', 'ends' or 'bernstein'");
+}
 
 }  // namespace
 }  // namespace ricochet::test::detectors_conformance_test
