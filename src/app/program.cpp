@@ -18,10 +18,10 @@
 #include <stdexcept>
 #include <string_view>
 
+#include "core/detect/named_detectors.hpp"
 #include "joined.hpp"
 #include "options.hpp"
 #include "report.hpp"
-#include "ricochet/detail/named_detectors.hpp"
 #include "ricochet/nn/model.hpp"
 #include "say.hpp"
 

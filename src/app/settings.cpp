@@ -6,11 +6,11 @@
 #include <array>
 #include <utility>
 
+#include "core/detect/named_detectors.hpp"
 #include "input.hpp"
 #include "interrupt.hpp"
 #include "model_lookup.hpp"
 #include "registry.hpp"
-#include "ricochet/detail/named_detectors.hpp"
 
 namespace ricochet::app {
 

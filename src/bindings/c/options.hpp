@@ -6,7 +6,7 @@
 #include <string>
 
 #include "bindings/c/error.hpp"
-#include "ricochet/detail/named_detectors.hpp"
+#include "core/detect/named_detectors.hpp"
 #include "ricochet/methods.hpp"
 #include "ricochet/options.hpp"
 

@@ -9,8 +9,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "core/detect/named_detectors.hpp"
 #include "network.hpp"
-#include "ricochet/detail/named_detectors.hpp"
 
 namespace py = pybind11;
 

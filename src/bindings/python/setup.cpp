@@ -6,9 +6,9 @@
 #include <string>
 #include <utility>
 
+#include "core/detect/named_detectors.hpp"
 #include "ricochet/detail/finders.hpp"
 #include "ricochet/detail/kernels.hpp"
-#include "ricochet/detail/named_detectors.hpp"
 #include "ricochet/extremum.hpp"
 #include "ricochet/locators.hpp"
 #include "ricochet/planned.hpp"

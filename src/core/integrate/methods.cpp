@@ -1,7 +1,8 @@
 #include "ricochet/methods.hpp"
-#include "ricochet/detail/named_detectors.hpp"
 
 #include <vector>
+
+#include "core/detect/named_detectors.hpp"
 
 namespace ricochet::detail {
 

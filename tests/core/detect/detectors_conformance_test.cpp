@@ -1,7 +1,7 @@
 // Applies the common suite to every detector.
 #include "conformance/detectors.hpp"
 
-#include "ricochet/detail/named_detectors.hpp"
+#include "core/detect/named_detectors.hpp"
 #include "ricochet/enclosed.hpp"
 #include "ricochet/gates.hpp"
 

@@ -1,5 +1,3 @@
-// Internal: the declarations of this header may change without notice.
-//
 // The detectors that are chosen by name, in one list: the command line, Python, C and their
 // messages are made from it. Those that need bounds or a model have options of their own.
 #pragma once
