@@ -8,6 +8,8 @@ from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, Modul
 
 import numpy as np
 
+from . import _ricochet
+
 #: Functions of Python whose results depend on their arguments alone.
 _PURE = {getattr(builtins, name) for name in (
     "abs", "all", "any", "bool", "dict", "divmod", "enumerate", "filter", "float", "int", "isinstance",
@@ -19,8 +21,21 @@ _RANDOM = ("random", "empty", "empty_like", "fromfile", "load")
 _MOST = 64  # numbers in an array or a container
 
 
+# What `_ricochet.unchanged` compares: a kind, an object, a key or None, and what was there.
+CELL, ITEM, LIST, DICT, TYPE, ARRAY, FUNCTION = range(7)
+_ABSENT = _ricochet.absent  # in the place of an item that a dictionary did not have
+
+
 class _Unknown(Exception):
     """Something whose changes cannot be seen."""
+
+
+class _Seen(dict):
+    """Numbers of the functions that were seen, and the places where something may change."""
+
+    def __init__(self):
+        super().__init__()
+        self.places = []
 
 
 def _value(x, seen):
@@ -33,6 +48,8 @@ def _value(x, seen):
     if kind in (tuple, list):
         if len(x) > _MOST:
             raise _Unknown
+        if kind is list:
+            seen.places.append((LIST, x, None, tuple(x)))
         return kind, tuple([_value(each, seen) for each in x])
     if kind is FunctionType:
         return _function(x, seen)
@@ -41,6 +58,7 @@ def _value(x, seen):
     if kind is np.ndarray:
         if x.size > _MOST or x.dtype == object:
             raise _Unknown
+        seen.places.append((ARRAY, x, x.shape, x.tobytes()))
         return x.dtype.str, x.shape, x.tobytes()
     if isinstance(x, np.generic):
         return x.dtype.str, x.tobytes()
@@ -57,6 +75,7 @@ def _value(x, seen):
     if kind is dict:
         if len(x) > _MOST:
             raise _Unknown
+        seen.places.append((DICT, x, None, dict(x)))
         return kind, tuple([(_value(key, seen), _value(each, seen)) for key, each in x.items()])
     raise _Unknown
 
@@ -81,17 +100,21 @@ def _function(function, seen):
     if function in seen:
         return seen[function]
     seen[function] = number = len(seen)  # also ends recursion
-    code, given = function.__code__, function.__globals__
+    code, given, places = function.__code__, function.__globals__, seen.places
     out = [number, code]
+    places.append((FUNCTION, function, code, (function.__defaults__, function.__kwdefaults__)))
     for cell in function.__closure__ or ():
+        places.append((CELL, cell, None, cell.cell_contents))
         out.append(_value(cell.cell_contents, seen))
     out.append(_value(function.__defaults__, seen))
     for more in (function.__kwdefaults__, function.__dict__):
         if more:
             out.append(_value(more, seen))
+    places.append((DICT, function.__dict__, None, dict(function.__dict__)))
     for name in _names_of(code):
         if name in _RANDOM:
             raise _Unknown
+        places.append((ITEM, given, name, given.get(name, _ABSENT)))
         if name in given:
             out.append((name, _value(given[name], seen)))
         else:
@@ -109,7 +132,7 @@ def _members(owner, seen):
         for name in _names_of(function.__code__):
             if name in own:
                 out.append((name, _value(own[name], seen)))
-                continue
+                continue  # the owner's dictionary, and those of its classes, are compared as a whole
             for cls in type(owner).__mro__:
                 if name in vars(cls):
                     if cls is not object and not cls.__module__.startswith("ricochet"):
@@ -118,12 +141,13 @@ def _members(owner, seen):
     return out
 
 
-def fingerprint(functions, owner, args):
+def fingerprint(functions, owner, args, places=None):
     """All that formulas of these functions depend on, equal as long as they are; or None.
 
-    None: something among it could change unseen, such as an object of a class.
+    None: something among it could change unseen, such as an object of a class. ``places`` is extended
+    by all places from where it was read, but those of `places_of_members`.
     """
-    seen = {}
+    seen = _Seen()
     try:
         out = [_value(args, seen)]
         for function in functions:
@@ -136,7 +160,33 @@ def fingerprint(functions, owner, args):
             out.append(members)
     except (_Unknown, TypeError, ValueError, RecursionError):  # of empty cells, unhashable members
         return None
+    if places is not None:
+        places += seen.places
     return out
+
+
+def places_of_members(owner, values):
+    """The places of an object's attributes, and of the contents of these ``values``; or None.
+
+    None: a class computes attributes, or something could change unseen.
+    """
+    seen = _Seen()
+    try:
+        for value in values:
+            if not callable(value):
+                _value(value, seen)
+    except _Unknown:
+        return None
+    out = [(DICT, vars(owner), None, dict(vars(owner)))]
+    for cls in type(owner).__mro__:
+        if cls is object or cls.__module__.startswith("ricochet"):
+            continue
+        members = dict(vars(cls))
+        if any(isinstance(member, property) for member in members.values()) or (
+                not members.keys().isdisjoint(("__getattr__", "__getattribute__"))):
+            return None
+        out.append((TYPE, cls, None, members))
+    return out + seen.places
 
 
 #: Methods that change their object, of lists, dictionaries, sets, files and generators.
@@ -170,12 +220,12 @@ def _changes_something(function, owner):
     return any(isinstance(value, (list, dict, set, np.ndarray)) for value in read)
 
 
-def pure_fingerprint(functions, owner, args):
+def pure_fingerprint(functions, owner, args, places=None):
     """As `fingerprint`, of functions that change nothing outside of them; else None."""
-    found = fingerprint(functions, owner, args)
+    found = fingerprint(functions, owner, args, places)
     if found is None:
         return None
-    seen = {}
+    seen = _Seen()
     for function in functions:
         _value(function, seen)
     if owner is not None:
@@ -184,7 +234,10 @@ def pure_fingerprint(functions, owner, args):
 
 
 class Kept:
-    """Formulas with the fingerprint of what they were recorded from; copies begin without any."""
+    """Formulas with the fingerprint of what they were recorded from; copies begin without any.
+
+    Or a source with the dictionary of the system that it belongs to.
+    """
 
     __slots__ = ("pair",)  # replaced as a whole, for other threads
 

@@ -205,6 +205,11 @@ def integrate(system, x0, t_end, *, progress=None, **options):
         run = _ricochet.integrate_plain(system._source, x0, t_end, options)
         if run is not None:
             return run
+    elif isinstance(system, System):
+        kept = system._kept_run()
+        run = _ricochet.integrate_kept(*kept, x0, t_end, options) if kept is not None else None
+        if run is not None:
+            return run
     source, x0, options, modes = prepare(system, x0, t_end, options)
     return _ricochet.integrate(source, x0, options, modes)
 

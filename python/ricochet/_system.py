@@ -12,7 +12,7 @@ from ._compiled import (C_FLOW, C_GUARD, C_JACOBIAN, C_RATE, C_RESET, Compiled, 
                         is_compiled)
 from ._formula import Formula
 from ._inclusion import specification_of
-from ._kept import Kept, fingerprint, pure_fingerprint
+from ._kept import DICT, LIST, Kept, fingerprint, places_of_members, pure_fingerprint
 from ._numbers import meant_by, number_from
 
 #: The largest number of events after which a guard can end the run.
@@ -463,7 +463,31 @@ class System:
             out.append(member._specification(len(out)))
         return out
 
-    def _formulas(self, args, guards):
+    def _kept_run(self):
+        """The places, source and modes of the last run by formulas, as they were; or None."""
+        kept = vars(self).get("_kept_source")
+        of, found = kept.pair if kept is not None else (None, None)
+        return found if of is vars(self) else None  # else this is a copy
+
+    def _places(self):
+        """The places of all that `_source` reads, beside what formulas depend on; or None."""
+        members = [member for cls in type(self).__mro__ for member in vars(cls).values()]
+        guards = [each for each in (*self.guards, *members) if isinstance(each, Guard)]
+        values = [getattr(self, name, None) for name in (
+            "modes", "time_events", "parameters", "unilateral", "direction")]
+        values = [value for value in values if not isinstance(value, _ricochet.Times)]
+        values += [guard._numbers["in_modes"] for guard in guards]
+        out = places_of_members(self, values)
+        if out is None or not isinstance(self.guards, (list, tuple)):
+            return None
+        if isinstance(self.guards, list):
+            out.append((LIST, self.guards, None, tuple(self.guards)))
+        for guard in guards:
+            out += [(DICT, part, None, dict(part))
+                    for part in (vars(guard), guard._functions, guard._numbers)]
+        return out
+
+    def _formulas(self, args, guards, places):
         """The flow as a formula; those of the guards are put into their specifications."""
         components, modes = self.formula, self._mode_list()
         if type(components) is not int or components < 1:
@@ -483,12 +507,12 @@ class System:
             raise TypeError("flow: found a compiled function beside formula")
         # Functions are called with symbols again only where something that they read has changed.
         functions = [self.flow, *(guard["value"] for guard in guards)]
-        of = fingerprint(functions, self, args)
+        of = fingerprint(functions, self, args, places)
         if of is not None and all(isinstance(mode, (int, str, Enum)) for mode in modes or ()):
             of = of, components, modes, [guard["in_modes"] for guard in guards]
         else:
             of = None
-        kept = vars(self).setdefault("_kept", Kept())
+        kept = self._kept
         known, formulas = kept.pair
         if of is None or known != of:
             formulas = [Formula(self.flow, components, modes, args, "flow", True)]
@@ -498,19 +522,19 @@ class System:
             guard["value"] = formula
         return formulas[0]
 
-    def _reset_formulas(self, args, guards):
+    def _reset_formulas(self, args, guards, places):
         """Puts formulas in place of the resets and rests that can be recorded; the time reset."""
         given = [(guard, key) for guard in guards for key in ("reset", "rest") if guard[key]]
         functions = [guard[key] for guard, key in given if not guard["directed"]]
         if self.time_reset is not None:
             functions.append(self.time_reset)
         functions = [function for function in functions if not is_compiled(function)]
-        of = pure_fingerprint(functions, self, args)
+        of = pure_fingerprint(functions, self, args, places)
         modes = self._mode_list()
         if of is None or not all(isinstance(mode, (int, str, Enum)) for mode in modes or ()):
             return self.time_reset
         of = of, self.formula, modes, [guard["in_modes"] for guard in guards]
-        kept = vars(self).setdefault("_kept_resets", Kept())
+        kept = self._kept_resets
         known, formulas = kept.pair
         if known != of:
             formulas = {}
@@ -557,6 +581,10 @@ class System:
 
     def _source(self, args=None, watch=None):
         """The C++ object; ``watch(flow, is_moded)`` may put a function around the flow."""
+        may_keep = self.formula is not None and not args and watch is None
+        found = self._kept_run() if may_keep else None
+        if found is not None and _ricochet.unchanged(found[0]):
+            return found[1]
         flow = as_function(self.flow, C_FLOW, "flow")
         if not callable(flow) and not isinstance(flow, Compiled):
             raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
@@ -585,8 +613,13 @@ class System:
             raise ValueError("reset_set: found it without guards, expected some, or a time_reset")
         time_reset = self.time_reset
         if self.formula is not None:
-            flow = self._formulas(args, guards)
-            time_reset = self._reset_formulas(args, guards)
+            for name in ("_kept", "_kept_resets", "_kept_source"):
+                vars(self).setdefault(name, Kept())
+            places = self._places() if may_keep else None
+            read = [] if places is None else places
+            flow = self._formulas(args, guards, read)
+            time_reset = self._reset_formulas(args, guards, read)
+            may_keep = places is not None and self._kept.pair[0] is not None
         if watch is not None:
             flow = watch(flow, self.modes is not None)
         source = _ricochet.callback_system(dict(
@@ -602,4 +635,6 @@ class System:
         if self.parameters is not None:
             source.parameters = {name.replace("_", "-"): float(value)
                                  for name, value in dict(self.parameters).items()}
+        if may_keep and source.is_free:  # then it holds nothing that refers to this system
+            self._kept_source.pair = vars(self), (tuple(places), source, self._mode_list())
         return source

@@ -10,5 +10,6 @@ void bind_runs(pybind11::module_& module);
 void bind_monitor(pybind11::module_& module);
 void bind_ensemble(pybind11::module_& module);
 void bind_network(pybind11::module_& module);
+void bind_places(pybind11::module_& module);
 
 }  // namespace ricochet::python

@@ -706,44 +706,31 @@ void CallbackSource::fill_table()
     CallbackAdapter::fill(table_, *this);
 }
 
-std::unique_ptr<RunAdapter> CallbackSource::open(const State& x0) const
+void CallbackSource::require_size(const State& x0) const
 {
-    if (flow_.is_formula) {
-        const std::size_t expected =
-            static_cast<const ModedFormula*>(flow_.user)->in(0).components();
-        if (x0.size() != expected) {
-            throw std::invalid_argument("x0: found " + std::to_string(x0.size()) +
-                                        " components for a formula of " + std::to_string(expected));
-        }
-    }
-    return std::make_unique<CallbackAdapter>(*this);
+    if (!flow_.is_formula) return;
+    const std::size_t expected = static_cast<const ModedFormula*>(flow_.user)->in(0).components();
+    if (x0.size() == expected) return;
+    throw std::invalid_argument("x0: found " + std::to_string(x0.size()) +
+                                " components for a formula of " + std::to_string(expected));
 }
 
-std::optional<std::vector<const ModedFormula*>> CallbackSource::guard_formulas() const
+std::unique_ptr<RunAdapter> CallbackSource::open(const State& x0) const
 {
-    std::vector<const ModedFormula*> guards;
-    for (const CallbackGuard& guard : guards_) {
-        if (!guard.value.is_formula) return std::nullopt;
-        guards.push_back(static_cast<const ModedFormula*>(guard.value.user));
-    }
-    return guards;
+    require_size(x0);
+    return std::make_unique<CallbackAdapter>(*this);
 }
 
 std::unique_ptr<RunAdapter> CallbackSource::open_by_series(const State& x0) const
 {
-    auto guards = guard_formulas();
-    if (!flow_.is_formula || !guards) return Source::open_by_series(x0);
-    const auto& flow = *static_cast<const ModedFormula*>(flow_.user);
-    return std::make_unique<FormulaAdapter<detail::TaylorOf<0>>>(open(x0), flow, std::move(*guards),
-                                                                 x0);
+    if (!series_) return Source::open_by_series(x0);
+    return std::make_unique<FormulaAdapter<detail::TaylorOf<0>>>(open(x0), *series_, x0);
 }
 
 std::unique_ptr<RunAdapter> CallbackSource::open_implicit(const State& x0) const
 {
-    auto guards = guard_formulas();
-    if (!flow_.is_formula || !guards) return implicit_adapter(open(x0), x0);
-    const auto& flow = *static_cast<const ModedFormula*>(flow_.user);
-    return implicit_formula_adapter(open(x0), flow, std::move(*guards), x0);
+    if (!series_) return implicit_adapter(open(x0), x0);
+    return implicit_formula_adapter(open(x0), *series_, x0);
 }
 
 }  // namespace ricochet::python

@@ -2,6 +2,7 @@
 
 #include <pybind11/pybind11.h>
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -84,6 +85,8 @@ CallbackSource::CallbackSource(PyObject* specification)
     }
     free_ = needs_no_interpreter();
     table_.changes_dimension = truth_in(specification, "changes_dimension");
+    series_ = series_of_formulas();
+    small_ = may_be_small();
     fill_table();
 }
 
@@ -178,6 +181,28 @@ bool CallbackSource::needs_no_interpreter() const
                is_free(guard.upper_bound);
     }
     return free;
+}
+
+std::unique_ptr<FormulaSeries> CallbackSource::series_of_formulas() const
+{
+    const auto formula = [](const Function& of) {
+        return of.is_formula ? static_cast<const ModedFormula*>(of.user) : nullptr;
+    };
+    std::vector<const ModedFormula*> guards;
+    for (const CallbackGuard& guard : guards_) guards.push_back(formula(guard.value));
+    const bool all = std::ranges::find(guards, nullptr) == guards.end();
+    if (!all || !flow_.is_formula) return nullptr;
+    return std::make_unique<FormulaSeries>(*formula(flow_), std::move(guards));
+}
+
+bool CallbackSource::may_be_small() const
+{
+    bool may = free_ && !jacobian_ && !table_.changes_dimension;
+    for (const CallbackGuard& guard : guards_) {
+        may = may && !guard.rate && !guard.speed_bound && !guard.acceleration_bound &&
+              !guard.lower_bound && !guard.upper_bound;
+    }
+    return may;
 }
 
 void CallbackSource::read_guard(PyObject* specification)

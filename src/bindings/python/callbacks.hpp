@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "formula.hpp"
+#include "formula_series.hpp"
 #include "nonsmooth/sized_inclusion.hpp"
 #include "source.hpp"
 
@@ -80,11 +80,16 @@ public:
     [[nodiscard]] std::unique_ptr<RunAdapter> open(const State& x0) const override;
     [[nodiscard]] std::unique_ptr<RunAdapter> open_by_series(const State& x0) const override;
     [[nodiscard]] std::unique_ptr<RunAdapter> open_implicit(const State& x0) const override;
+    [[nodiscard]] bool is_free() const noexcept override { return free_; }
     [[nodiscard]] std::vector<std::string> mode_names() const override;
     [[nodiscard]] std::vector<std::string> guard_names() const override;
+    /// By the loop for up to four components, where no function needs the interpreter.
+    [[nodiscard]] std::optional<Record> run_whole(const State& x0, const Request& request,
+                                                  SignalWatch& watch) const override;
 
 private:
     friend class CallbackAdapter;
+    friend class SmallSystem;
 
     void read_functions(PyObject* specification);
     void read_arguments(PyObject* specification);
@@ -98,8 +103,12 @@ private:
     /// Whether no function that a run calls needs the interpreter.
     [[nodiscard]] bool needs_no_interpreter() const;
     void fill_table();
-    /// The guards as formulas; nothing if one of them is none.
-    [[nodiscard]] std::optional<std::vector<const ModedFormula*>> guard_formulas() const;
+    /// The series of flow and guards; null if one of them is no formula.
+    [[nodiscard]] std::unique_ptr<FormulaSeries> series_of_formulas() const;
+    /// @throws std::invalid_argument for a start that does not fit its formulas
+    void require_size(const State& x0) const;
+    /// Whether the loop for a few components can run it.
+    [[nodiscard]] bool may_be_small() const;
 
     std::string name_;
     std::string flow_title_;      ///< in messages: "flow", "fun"
@@ -115,6 +124,8 @@ private:
     bool moded_ = false;
     bool as_list_ = false;  ///< states are passed as lists of floats
     bool free_ = false;     ///< whether none of its functions needs the interpreter
+    bool small_ = false;    ///< see `may_be_small`
+    std::unique_ptr<FormulaSeries> series_;
     detail::SystemTable<State> table_;
 };
 

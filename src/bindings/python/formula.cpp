@@ -1,5 +1,7 @@
 #include "formula.hpp"
 
+#include "formula_series.hpp"
+
 #include <algorithm>
 #include <span>
 #include <stdexcept>
@@ -19,7 +21,9 @@ constexpr auto plain =
 Formula::Formula(std::size_t components,
                  const std::vector<std::tuple<std::string, std::size_t, std::size_t, double>>& ops,
                  std::vector<std::size_t> outputs)
-    : components_(components), outputs_(std::move(outputs))
+    : components_(components),
+      outputs_(std::move(outputs)),
+      code_(std::make_unique<LateCode<ValuesCode>>())
 {
     for (const auto& [name, a, b, value] : ops) {
         const auto found = std::ranges::find(plain, name);
@@ -56,11 +60,20 @@ std::vector<double>& scratch()
 
 }  // namespace
 
+void Formula::compute(double t, const double* x, double* out) const
+{
+    if (const ValuesCode code = code_->get()) return code(t, x, out);
+    // As many as a method of six stages asks for in fifty steps; less time than the code takes.
+    constexpr std::uint32_t enough = 300;
+    code_->count(enough, [&] { return code(); });
+    evaluate(t, x, out, scratch());
+}
+
 void formula_flow(std::uint32_t mode, double t, const double* x, double* dxdt, std::size_t /*n*/,
                   void* user)
 {
     const auto& formulas = *static_cast<const ModedFormula*>(user);
-    formulas.in(mode).evaluate(t, x, dxdt, scratch());
+    formulas.in(mode).compute(t, x, dxdt);
 }
 
 std::uint32_t formula_reset(std::uint32_t mode, double t, double* x, std::size_t n, void* user)
@@ -68,7 +81,7 @@ std::uint32_t formula_reset(std::uint32_t mode, double t, double* x, std::size_t
     thread_local std::vector<double> after;
     const auto& formulas = *static_cast<const ModedFormula*>(user);
     after.resize(n);
-    formulas.in(mode).evaluate(t, x, after, scratch());
+    formulas.in(mode).compute(t, x, after.data());
     std::copy(after.begin(), after.end(), x);
     return mode < formulas.following.size() ? formulas.following[mode] : mode;
 }
@@ -77,8 +90,31 @@ double formula_guard(std::uint32_t mode, double t, const double* x, std::size_t 
 {
     const auto& formulas = *static_cast<const ModedFormula*>(user);
     double value = 0;
-    formulas.in(mode).evaluate(t, x, &value, scratch());
+    formulas.in(mode).compute(t, x, &value);
     return value;
+}
+
+detail::LazyTape FormulaSeries::record(Mode mode) const
+{
+    using detail::Recorded;
+    const std::size_t n = flow_->in(mode).components();
+    detail::Recording recording;
+    std::vector<Recorded> x(n), results(n + guards_.size()), values;
+    for (Recorded& component : x) component = {recording, recording.push_back({})};
+    const Recorded t(recording, recording.push_back({}));
+    flow_->in(mode).evaluate(t, x, results, values);
+    for (std::size_t i = 0; i < guards_.size(); ++i) {
+        guards_[i]->in(mode).evaluate(t, x, &results[n + i], values);
+    }
+    std::vector<int> outputs;
+    for (const Recorded& result : results) {
+        const auto constant = [&] {
+            return recording.push_back(
+                {.op = detail::TaylorOp::constant, .value = result.value(), .from = result.from()});
+        };
+        outputs.push_back(result.is_constant() ? constant() : result.index());
+    }
+    return {n, recording, std::move(outputs)};
 }
 
 }  // namespace ricochet::python

@@ -2,21 +2,40 @@
 // without Python.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <tuple>
 #include <vector>
 
 #include "formula_code.hpp"
+#include "machine_code.hpp"
 
 namespace ricochet::python {
 
-/// An operation on results of operations before it.
-struct FormulaOp {
-    FormulaCode code;
-    std::size_t a = 0, b = 0;
-    double value = 0;  ///< value, if it is a constant
+/// Code that is made once something has been computed often enough without; for all threads.
+template <class Function>
+class LateCode {
+public:
+    /// The code, or null.
+    [[nodiscard]] Function get() const noexcept { return code_.load(std::memory_order_acquire); }
+
+    /// Counts one more time, and makes the code when there have been `enough`.
+    template <class Make>
+    void count(std::uint32_t enough, const Make& make) noexcept
+    {
+        if (counted_.load(std::memory_order_relaxed) >= enough) return;
+        if (counted_.fetch_add(1, std::memory_order_relaxed) + 1 != enough) return;
+        made_ = make();
+        if (made_.start()) code_.store(made_.as<Function>(), std::memory_order_release);
+    }
+
+private:
+    std::atomic<Function> code_ = nullptr;
+    std::atomic<std::uint32_t> counted_ = 0;
+    MachineCode made_;  ///< written by one thread
 };
 
 /// Functions of the time and the state, for scalars of any type.
@@ -31,6 +50,13 @@ public:
             std::vector<std::size_t> outputs);
 
     [[nodiscard]] std::size_t components() const noexcept { return components_; }
+
+    /// The values for numbers, by code once there have been many.
+    /// @param out  may not overlap x
+    void compute(double t, const double* x, double* out) const;
+
+    /// Code for `compute`, or nothing.
+    [[nodiscard]] MachineCode code() const noexcept { return code_of_values(ops_, outputs_); }
 
     /// @param values  work space
     template <class S, class Xs, class Outputs>
@@ -55,6 +81,7 @@ private:
     std::size_t components_;
     std::vector<FormulaOp> ops_;
     std::vector<std::size_t> outputs_;
+    std::unique_ptr<LateCode<ValuesCode>> code_;
 };
 
 /// A formula for each mode. Its address is passed to compiled functions as `user`.

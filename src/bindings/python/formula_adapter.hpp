@@ -4,11 +4,14 @@
 #include <algorithm>
 #include <cstddef>
 #include <memory>
+#include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include "formula.hpp"
+#include "formula_series.hpp"
 #include "forwarding.hpp"
 #include "ricochet/detail/stepper_adapter.hpp"
 #include "ricochet/detail/system_table.hpp"
@@ -23,21 +26,19 @@ public:
     static constexpr bool unchecked_names = true;
     using State = python::State;
 
-    FormulaSystem(RunAdapter& callbacks, const ModedFormula& flow,
-                  std::vector<const ModedFormula*> guards, std::size_t modes)
+    FormulaSystem(RunAdapter& callbacks, const FormulaSeries& series)
         : name(callbacks.table().name(callbacks.adapter())),
           callbacks_(&callbacks),
-          flow_(&flow),
-          guards_(std::move(guards)),
-          modes_(modes)
+          series_(&series)
     {
     }
 
     std::string name;
 
     [[nodiscard]] RunAdapter& callbacks() const noexcept { return *callbacks_; }
-    [[nodiscard]] std::size_t mode_count() const noexcept { return modes_; }
-    [[nodiscard]] std::size_t guard_count() const noexcept { return guards_.size(); }
+    [[nodiscard]] std::size_t mode_count() const noexcept { return series_->modes(); }
+    [[nodiscard]] std::size_t guard_count() const noexcept { return series_->guards().size(); }
+    [[nodiscard]] const FormulaSeries& series() const noexcept { return *series_; }
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const
     {
         return callbacks_->table().info(callbacks_->adapter(), which);
@@ -51,18 +52,28 @@ public:
             // The derivative by the time is asked for once for each Jacobian.
             callbacks_->implicit().jacobians += std::ranges::any_of(t.slope, is_set);
         }
-        flow_->in(mode).evaluate(t, x, dxdt, scratch<S>());
+        evaluate(series_->flow().in(mode), t, x, std::span(dxdt));
     }
     template <class S>
     [[nodiscard]] S guard(std::size_t which, Mode mode, const S& t, const std::vector<S>& x) const
     {
         callbacks_->watch().tick();
         S value(0.0);
-        guards_[which]->in(mode).evaluate(t, x, &value, scratch<S>());
+        evaluate(series_->guards()[which]->in(mode), t, x, std::span(&value, 1));
         return value;
     }
 
 private:
+    template <class S, class Outputs>
+    static void evaluate(const Formula& formula, const S& t, const std::vector<S>& x, Outputs&& out)
+    {
+        if constexpr (std::is_same_v<S, double>) {
+            formula.compute(t, x.data(), out.data());
+        } else {
+            thread_local std::vector<S> values;
+            formula.evaluate(t, x, out, values);
+        }
+    }
     template <class S>
     static constexpr bool is_dual = requires(const S& s)
     {
@@ -70,17 +81,8 @@ private:
     };
     [[nodiscard]] static bool is_set(double slope) noexcept { return slope != 0; }
 
-    template <class S>
-    [[nodiscard]] static std::vector<S>& scratch()
-    {
-        thread_local std::vector<S> values;
-        return values;
-    }
-
     RunAdapter* callbacks_;
-    const ModedFormula* flow_;
-    std::vector<const ModedFormula*> guards_;
-    std::size_t modes_;
+    const FormulaSeries* series_;
 };
 
 /// @param callbacks  a adapter to the system, used for resets and all functions other than flow and
@@ -91,11 +93,11 @@ class FormulaAdapter final : public RunAdapter {
     using Table = detail::SystemTable<State>;
 
 public:
-    FormulaAdapter(std::unique_ptr<RunAdapter> callbacks, const ModedFormula& flow,
-                   std::vector<const ModedFormula*> guards, const State& x0)
+    FormulaAdapter(std::unique_ptr<RunAdapter> callbacks, const FormulaSeries& series,
+                   const State& x0)
         : callbacks_(std::move(callbacks)),
           table_(detail::system_table<FormulaSystem, State>),
-          system_(*callbacks_, flow, std::move(guards), flow.by_mode.size()),
+          system_(*callbacks_, series),
           adapter_(system_, x0)
     {
         Forwarding<FormulaSystem>::all_but_flow_and_guards(table_, callbacks_->table());

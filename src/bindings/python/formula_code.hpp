@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
@@ -37,6 +38,13 @@ enum class FormulaCode : std::uint8_t {
     parameter,  ///< number a
     network,    ///< number a, whose inputs begin at b in the list of operands
     output,     ///< number b of the network's evaluation a
+};
+
+/// An operation on results of operations before it.
+struct FormulaOp {
+    FormulaCode code;
+    std::size_t a = 0, b = 0;
+    double value = 0;  ///< value, if it is a constant
 };
 
 /// Names of the operations, in the order of `FormulaCode`.

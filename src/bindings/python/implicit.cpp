@@ -212,12 +212,9 @@ std::unique_ptr<RunAdapter> implicit_adapter(std::unique_ptr<RunAdapter> callbac
 }
 
 std::unique_ptr<RunAdapter> implicit_formula_adapter(std::unique_ptr<RunAdapter> callbacks,
-                                                     const ModedFormula& flow,
-                                                     std::vector<const ModedFormula*> guards,
-                                                     const State& x0)
+                                                     const FormulaSeries& series, const State& x0)
 {
-    return std::make_unique<FormulaAdapter<Rosenbrock4>>(std::move(callbacks), flow,
-                                                         std::move(guards), x0);
+    return std::make_unique<FormulaAdapter<Rosenbrock4>>(std::move(callbacks), series, x0);
 }
 
 }  // namespace ricochet::python

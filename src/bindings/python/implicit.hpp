@@ -2,9 +2,8 @@
 #pragma once
 
 #include <memory>
-#include <vector>
 
-#include "formula.hpp"
+#include "formula_series.hpp"
 #include "source.hpp"
 
 namespace ricochet::python {
@@ -16,7 +15,6 @@ namespace ricochet::python {
 /// A adapter for formulas, of which the Jacobian is exact.
 /// @param callbacks  a adapter to the same system, for its resets and further functions
 [[nodiscard]] std::unique_ptr<RunAdapter> implicit_formula_adapter(
-    std::unique_ptr<RunAdapter> callbacks, const ModedFormula& flow,
-    std::vector<const ModedFormula*> guards, const State& x0);
+    std::unique_ptr<RunAdapter> callbacks, const FormulaSeries& series, const State& x0);
 
 }  // namespace ricochet::python

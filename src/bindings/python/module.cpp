@@ -4,6 +4,7 @@
 #include <pybind11/stl.h>
 
 #include <bit>
+#include <chrono>
 #include <cstdint>
 #include <exception>
 #include <map>
@@ -18,6 +19,7 @@
 #include "callbacks.hpp"
 #include "filippov.hpp"
 #include "formula.hpp"
+#include "formula_series.hpp"
 #include "ready.hpp"
 #include "ricochet/nn/model.hpp"
 #include "source.hpp"
@@ -27,6 +29,56 @@ namespace py = pybind11;
 namespace {
 
 using ricochet::python::ReadyDescription;
+
+using Numbers = std::vector<double>;
+
+/// The values of a formula, by the interpreter or by code; nothing where no code is made.
+std::optional<Numbers> values_of(const ricochet::python::ModedFormula& of, double t,
+                                 const Numbers& x, std::size_t count, bool by_code)
+{
+    Numbers out(count), scratch;
+    const ricochet::python::Formula& formula = of.in(0);
+    if (!by_code) {
+        formula.evaluate(t, x, out, scratch);
+        return out;
+    }
+    const ricochet::python::MachineCode code = formula.code();
+    if (!code.start()) return std::nullopt;
+    code.as<ricochet::python::ValuesCode>()(t, x.data(), out.data());
+    return out;
+}
+
+/// The coefficients of a flow and of a guard, likewise.
+std::optional<std::pair<Numbers, Numbers>> series_of(const ricochet::python::ModedFormula& flow,
+                                                     const ricochet::python::ModedFormula& guard,
+                                                     double t, const Numbers& x, int order,
+                                                     bool by_code)
+{
+    const ricochet::python::FormulaSeries series(flow, {&guard});
+    ricochet::detail::LazyTape tape = series.record(0);
+    constexpr std::size_t rows = ricochet::detail::most_taylor_order + 1;
+    Numbers out(rows * x.size()), guards(rows);
+    if (!by_code) {
+        tape.compute(t, x.data(), {order, out.data(), guards.data()});
+    } else {
+        const ricochet::python::MachineCode code = ricochet::python::code_of_series(tape);
+        if (!code.start()) return std::nullopt;
+        code.as<ricochet::python::SeriesCode>()(t, x.data(), order, out.data(), guards.data());
+    }
+    return std::pair(std::move(out), std::move(guards));
+}
+
+/// Microseconds that code for the series of a flow and a guard takes to make, and its bytes.
+std::pair<double, std::size_t> time_to_make_series(const ricochet::python::ModedFormula& flow,
+                                                   const ricochet::python::ModedFormula& guard)
+{
+    const ricochet::python::FormulaSeries series(flow, {&guard});
+    const ricochet::detail::LazyTape tape = series.record(0);
+    const auto start = std::chrono::steady_clock::now();
+    const ricochet::python::MachineCode code = ricochet::python::code_of_series(tape);
+    const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - start;
+    return {took.count(), code.size()};
+}
 
 py::dict described(const ricochet::KnownFunction& known)
 {
@@ -87,6 +139,7 @@ PYBIND11_MODULE(_ricochet, module)
         .def_property_readonly("guard_count",
                                [](const Source& self) { return self.guard_names().size(); })
         .def_property_readonly("start_mode", &Source::start_mode)
+        .def_property_readonly("is_free", &Source::is_free)
         .def_property(
             "parameters",
             [](const Source& self) {
@@ -97,6 +150,7 @@ PYBIND11_MODULE(_ricochet, module)
                 self.parameters = {given.begin(), given.end()};
             });
     bind_results(module);
+    bind_places(module);
     module.def("ready_system", [](const std::string& name, const std::vector<double>& parameters) {
         return ready_system(name, parameters);
     });
@@ -155,6 +209,9 @@ PYBIND11_MODULE(_ricochet, module)
         .def_property_readonly_static(
             "guard_address",
             [](const py::object&) { return std::bit_cast<std::uintptr_t>(&formula_guard); })
+        .def("values", &values_of)
+        .def("series", &series_of)
+        .def("time_to_make_series", &time_to_make_series)
         .def_property_readonly_static("reset_address", [](const py::object&) {
             return std::bit_cast<std::uintptr_t>(&formula_reset);
         });

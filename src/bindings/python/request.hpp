@@ -27,10 +27,12 @@ struct Request {
     bool dense = false;                   ///< keep every step as a polynomial
 
     /// Whether all choices are the defaults, so that a loop compiled for the system can be used.
-    [[nodiscard]] bool is_plain() const noexcept
+    [[nodiscard]] bool is_plain() const noexcept { return is_plain_or_series() && !by_series; }
+    /// The same but for Taylor's method.
+    [[nodiscard]] bool is_plain_or_series() const noexcept
     {
-        return detector == "extremum" && locator == "newton" && !fixed && !record_steps && !dense &&
-               !by_series && !implicit;
+        return detector == "extremum" && locator == "newton" && !gate && !fixed && !record_steps &&
+               !dense && !implicit;
     }
 };
 

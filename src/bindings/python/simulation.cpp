@@ -11,6 +11,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "places.hpp"
 #include "read_request.hpp"
 #include "results.hpp"
 #include "ricochet/detail/core.hpp"
@@ -131,7 +132,7 @@ PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& r
     SignalWatch watch;
     request.options.cancelled = watch.cancelled();
     std::optional<Record> whole;
-    if (request.is_plain()) {
+    if (request.is_plain_or_series()) {
         work_freely(true, [&] { whole = source->run_whole(x0, request, watch); });
     }
     if (whole) {
@@ -167,10 +168,10 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
     return run_of(source, x0, std::move(request), mode_names);
 }
 
-[[nodiscard]] bool is_plain_number(const py::handle& value)
+[[nodiscard]] bool is_plain(const py::handle& value)
 {
     return PyFloat_CheckExact(value.ptr()) || PyLong_CheckExact(value.ptr()) ||
-           PyBool_Check(value.ptr());
+           PyBool_Check(value.ptr()) || PyUnicode_CheckExact(value.ptr());
 }
 
 /// Whether `integrate` in Python would pass these options on as they are.
@@ -182,7 +183,7 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
         PyUnicode_InternFromString("sample_times"), PyUnicode_InternFromString("record_steps"),
         PyUnicode_InternFromString("t_end")};
     for (const auto& [key, value] : given) {
-        if (!PyUnicode_CHECK_INTERNED(key.ptr()) || !is_plain_number(value)) return false;
+        if (!PyUnicode_CHECK_INTERNED(key.ptr()) || !is_plain(value)) return false;
         if (std::ranges::find(translated, key.ptr()) != translated.end()) return false;
     }
     return true;
@@ -202,10 +203,10 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
     return start;
 }
 
-/// A run of a ready system whose arguments are numbers, without a translation in Python;
+/// A run whose arguments are numbers and names, without a translation in Python;
 /// None if they are not. A short run takes no longer than the translation.
-py::object integrate_plain(const std::shared_ptr<Source>& source, const py::object& x0,
-                           const py::object& t_end, const py::dict& options)
+py::object run_plainly(const std::shared_ptr<Source>& source, const py::object& mode_names,
+                       const py::object& x0, const py::object& t_end, const py::dict& options)
 {
     const State start = plain_start(x0.ptr());
     if (start.empty() || !PyFloat_CheckExact(t_end.ptr()) || !are_plain_options(options)) {
@@ -214,7 +215,23 @@ py::object integrate_plain(const std::shared_ptr<Source>& source, const py::obje
     Request request = request_from(options);
     request.options.t_end = PyFloat_AS_DOUBLE(t_end.ptr());
     request.options.mode = source->start_mode();
-    return py::cast(run_of(source, start, std::move(request), py::none()));
+    return py::cast(run_of(source, start, std::move(request), mode_names));
+}
+
+py::object integrate_plain(const std::shared_ptr<Source>& source, const py::object& x0,
+                           const py::object& t_end, const py::dict& options)
+{
+    return run_plainly(source, py::none(), x0, t_end, options);
+}
+
+/// The same for a system of formulas, by the source that is kept of it; None also where something
+/// has changed at one of the places that it was made from.
+py::object integrate_kept(const py::tuple& places, const std::shared_ptr<Source>& source,
+                          const py::object& mode_names, const py::object& x0,
+                          const py::object& t_end, const py::dict& options)
+{
+    if (!are_unchanged(places.ptr())) return py::none();
+    return run_plainly(source, mode_names, x0, t_end, options);
 }
 
 /// A run driven by the caller. Not for two threads at a time.
@@ -407,6 +424,7 @@ void bind_runs(py::module_& module)
 {
     module.def("integrate", &integrate);
     module.def("integrate_plain", &integrate_plain);
+    module.def("integrate_kept", &integrate_kept);
     module.def("option_names", &option_names);
     py::class_<PySimulation>(module, "Simulation")
         .def(py::init<std::shared_ptr<Source>, const State&, const py::dict&, const py::object&>())

@@ -148,6 +148,8 @@ public:
         return std::nullopt;
     }
 
+    /// Whether its runs need no interpreter and hold no function of Python.
+    [[nodiscard]] virtual bool is_free() const noexcept { return false; }
     /// Names of the modes, empty where they are numbers.
     [[nodiscard]] virtual std::vector<std::string> mode_names() const = 0;
     [[nodiscard]] virtual std::vector<std::string> guard_names() const = 0;

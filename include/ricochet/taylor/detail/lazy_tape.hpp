@@ -40,7 +40,8 @@ public:
     /// motion is a polynomial. Returns their number.
     int compute(double t, const double* x, const TaylorCoefficients<double>& to);
 
-private:
+    // What is computed, for other ways to compute it.
+
     /// As in `TaylorTape`.
     struct Tape {
         std::size_t states = 0;
@@ -51,7 +52,22 @@ private:
         std::vector<bool> for_guards;
         std::vector<int> degree;
     };
+    /// A term of a combination: an operation, or its place, and its factor.
+    struct Term {
+        std::size_t of;
+        double factor;
+    };
+    [[nodiscard]] const Tape& tape() const noexcept { return tape_; }
+    /// Constants by operation.
+    [[nodiscard]] const std::vector<double>& constants() const noexcept { return constants_; }
+    /// Terms, by operation, of those that are combinations.
+    [[nodiscard]] const std::vector<std::vector<Term>>& terms() const noexcept { return terms_; }
+    /// Whether an operation is only a part of combinations.
+    [[nodiscard]] bool is_absorbed(std::size_t i) const noexcept { return absorbed_[i]; }
+    /// The largest degree in time of states and guards.
+    [[nodiscard]] int degree() const noexcept { return degree_; }
 
+private:
     /// What is computed side by side: coefficient k of operations of one kind.
     enum class Pass {
         operation,
@@ -62,11 +78,6 @@ private:
     /// Places of the operands.
     struct Lane {
         std::uint32_t a, b;
-    };
-    /// A term of a combination: an operation, or its place, and its factor.
-    struct Term {
-        std::size_t of;
-        double factor;
     };
     struct Batch {
         Pass pass = Pass::operation;

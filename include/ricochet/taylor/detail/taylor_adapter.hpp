@@ -91,6 +91,16 @@ template <class System, std::size_t n, std::size_t... mode>
 /// that attract each other).
 inline constexpr std::size_t most_compiled_ops = 200;
 
+/// A system that may have functions that compute its series, made at run time, and is told of steps
+/// that are computed without.
+template <class System>
+concept SeriesAtRunTime = requires(const System& system, Mode mode, const LazyTape& tape)
+{
+    system.series().code(mode);
+    system.series().is_polynomial(mode);
+    system.series().count(mode, tape);
+};
+
 /// The number of guards with series of their own, where the size of the state is known.
 template <class System, std::size_t n>
 [[nodiscard]] constexpr std::size_t guards_with_series() noexcept
@@ -208,6 +218,11 @@ struct TaylorAdapter : SystemAdapter<System, X> {
         if constexpr (is_constant) {
             if (as_compiled_) return dispatch(mode, t, x, to, std::make_index_sequence<tapes>{});
         }
+        if constexpr (SeriesAtRunTime<System>) {
+            const auto& series = this->system().series();
+            if (const auto code = series.code(mode)) return code(t, x, to.order, to.x, to.guards);
+            series.count(mode, recorded(mode, step.size()));
+        }
         if constexpr (takes_series) return recorded(mode, step.size()).compute(t, x, to);
         return to.order;
     }
@@ -217,6 +232,10 @@ struct TaylorAdapter : SystemAdapter<System, X> {
     {
         if constexpr (is_constant) {
             if (as_compiled_) return polynomial_[mode < tapes ? mode : 0];
+        }
+        if constexpr (SeriesAtRunTime<System>) {
+            const auto& series = this->system().series();
+            if (series.code(mode)) return series.is_polynomial(mode);
         }
         if constexpr (takes_series) return recorded(mode, step.size()).is_polynomial();
         return false;

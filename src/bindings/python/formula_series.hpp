@@ -1,0 +1,64 @@
+// The power series of a flow and of guards that are formulas.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+#include <vector>
+
+#include "formula.hpp"
+#include "ricochet/guard.hpp"
+#include "ricochet/taylor/detail/lazy_tape.hpp"
+
+namespace ricochet::python {
+
+/// For each mode: the tape, and code that is made after some steps of any runs.
+class FormulaSeries {
+public:
+    /// Keeps references to the formulas.
+    FormulaSeries(const ModedFormula& flow, std::vector<const ModedFormula*> guards)
+        : flow_(&flow), guards_(std::move(guards)), modes_(flow.by_mode.size())
+    {
+        for (auto& mode : modes_) mode = std::make_unique<InMode>();
+    }
+
+    [[nodiscard]] const ModedFormula& flow() const noexcept { return *flow_; }
+    [[nodiscard]] const std::vector<const ModedFormula*>& guards() const noexcept
+    {
+        return guards_;
+    }
+    [[nodiscard]] std::size_t modes() const noexcept { return modes_.size(); }
+    /// The code in a mode, or null.
+    [[nodiscard]] SeriesCode code(Mode mode) const noexcept { return in(mode).code.get(); }
+    /// Whether the motion is a polynomial; known with the code.
+    [[nodiscard]] bool is_polynomial(Mode mode) const noexcept { return in(mode).is_polynomial; }
+    /// The operations in a mode.
+    [[nodiscard]] detail::LazyTape record(Mode mode) const;
+    /// Counts a step that was computed by the tape.
+    void count(Mode mode, const detail::LazyTape& tape) const noexcept
+    {
+        constexpr std::uint32_t enough = 50;
+        InMode& of = in(mode);
+        of.code.count(enough, [&] {
+            of.is_polynomial = tape.is_polynomial();
+            return code_of_series(tape);
+        });
+    }
+
+private:
+    struct InMode {
+        LateCode<SeriesCode> code;
+        bool is_polynomial = false;
+    };
+    [[nodiscard]] InMode& in(Mode mode) const noexcept
+    {
+        return *modes_[mode < modes_.size() ? mode : 0];
+    }
+
+    const ModedFormula* flow_;
+    std::vector<const ModedFormula*> guards_;
+    std::vector<std::unique_ptr<InMode>> modes_;
+};
+
+}  // namespace ricochet::python

@@ -1,0 +1,287 @@
+// Whole runs of compiled functions and formulas by the loop for up to four components, which keeps
+// its states in registers and on the stack. Their bits are those of the loop for vectors.
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "callbacks.hpp"
+#include "ricochet/detail/finders.hpp"
+#include "ricochet/detail/kernels.hpp"
+#include "ricochet/detail/system_adapter.hpp"
+#include "ricochet/extremum.hpp"
+#include "ricochet/locators.hpp"
+#include "ricochet/taylor/taylor.hpp"
+
+namespace ricochet::python {
+
+/// A system all of whose functions have addresses, for one run.
+class SmallSystem {
+    using Table = detail::SystemTable<detail::SmallState>;
+    using Adapter = detail::SystemAdapter<SmallSystem, detail::SmallState>;
+
+public:
+    static constexpr bool unchecked_names = true;
+    using State = detail::SmallState;
+
+    SmallSystem(const CallbackSource& source, std::size_t components, SignalWatch& watch)
+        : name(source.name_.empty() ? "Python" : source.name_),
+          source_(&source),
+          components_(components),
+          watch_(&watch)
+    {
+    }
+
+    std::string name;
+
+    [[nodiscard]] SignalWatch& watch() const noexcept { return *watch_; }
+    [[nodiscard]] const FormulaSeries& series() const noexcept { return *source_->series_; }
+    [[nodiscard]] std::size_t mode_count() const noexcept { return source_->mode_count_; }
+    [[nodiscard]] std::size_t guard_count() const noexcept { return source_->guards_.size(); }
+    [[nodiscard]] GuardInfo guard_info(std::size_t which) const { return guard(which).info; }
+
+    template <class Xs>
+    void flow(Mode mode, double t, const Xs& x, Xs& dxdt) const
+    {
+        watch_->tick();
+        const Function& function = source_->flow_;
+        reinterpret_cast<CompiledFlow>(function.address)(mode, t, x.data(), dxdt.data(),
+                                                         components_, function.user);
+    }
+    [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
+    {
+        watch_->tick();
+        // One that is not examined in this mode may have no value there.
+        if (!enabled(which, mode)) return 1;
+        const CallbackGuard& of = guard(which);
+        const double g = reinterpret_cast<CompiledGuard>(of.value.address)(
+            mode, t, x.data(), components_, of.value.user);
+        return g == 0 && of.info.boolean ? -1 : g;
+    }
+    [[nodiscard]] bool enabled(std::size_t which, Mode mode) const
+    {
+        const auto& in_mode = guard(which).in_mode;
+        return in_mode.empty() || (mode < in_mode.size() && in_mode[mode]);
+    }
+    [[nodiscard]] Mode reset(std::size_t which, Mode mode, double t, State& x) const
+    {
+        return edit(guard(which).reset, mode, t, x);
+    }
+    [[nodiscard]] Mode rest(std::size_t which, Mode mode, double t, State& x) const
+    {
+        return edit(guard(which).rest, mode, t, x);
+    }
+
+    /// What it has, as an adapter's table.
+    [[nodiscard]] Table table() const
+    {
+        Table table = detail::system_table<SmallSystem, State>;
+        const auto& guards = source_->guards_;
+        const auto none = [&](const auto& has) { return std::ranges::none_of(guards, has); };
+        table.guarded = !guards.empty();
+        table.moded = source_->moded_;
+        if (none([](const CallbackGuard& guard) { return !guard.in_mode.empty(); })) {
+            table.enabled_in = nullptr;
+        }
+        if (none([](const CallbackGuard& guard) { return bool(guard.reset); })) {
+            table.reset = nullptr;
+        }
+        if (none([](const CallbackGuard& guard) { return bool(guard.rest); })) {
+            table.rest = nullptr;
+        }
+        add_times(table);
+        return table;
+    }
+
+private:
+    [[nodiscard]] const CallbackGuard& guard(std::size_t which) const
+    {
+        return source_->guards_[which];
+    }
+    [[nodiscard]] static const SmallSystem& at(void* adapter) noexcept
+    {
+        return static_cast<Adapter*>(adapter)->system();
+    }
+    [[nodiscard]] Mode edit(const Function& function, Mode mode, double t, State& x) const
+    {
+        if (!function) return mode;
+        const Mode next = reinterpret_cast<CompiledReset>(function.address)(
+            mode, t, x.data(), components_, function.user);
+        return source_->moded_ ? next : mode;
+    }
+    void add_times(Table& table) const
+    {
+        if (source_->times_) {
+            table.next_time_event = [](void* adapter, double t) {
+                return at(adapter).source_->times_->next(t);
+            };
+            table.previous_time_event = [](void* adapter, double t) {
+                return at(adapter).source_->times_->previous(t);
+            };
+            table.time_event_count = [](void* adapter, double t) {
+                return at(adapter).source_->times_->count(t);
+            };
+        }
+        if (source_->time_reset_) {
+            table.time_reset = [](void* adapter, Mode mode, double t, State& x) {
+                return at(adapter).edit(at(adapter).source_->time_reset_, mode, t, x);
+            };
+        }
+    }
+
+    const CallbackSource* source_;
+    std::size_t components_;
+    SignalWatch* watch_;
+};
+
+}  // namespace ricochet::python
+
+namespace ricochet::detail {
+
+/// The series of a system whose guards are counted at run time, of n components.
+template <std::size_t n>
+struct TaylorAdapter<python::SmallSystem, SmallState, n>
+    : SystemAdapter<python::SmallSystem, SmallState> {
+    struct Step : TaylorStepOrigin {
+        alignas(16) std::array<double, (most_taylor_order + 1) * n> coefficients{};
+        std::vector<double> guards{};
+        std::array<double, n> x{};
+        std::size_t count = 0;
+
+        [[nodiscard]] static constexpr std::size_t size() noexcept { return n; }
+        [[nodiscard]] std::size_t guard_count() const noexcept { return count; }
+    };
+    struct Room {
+        using Array = std::array<double, n>;
+        using Guarded = SmallState;
+        Array w, rate;
+        Guarded x, there;
+    };
+    static constexpr bool on_series = true;
+
+    TaylorAdapter(const python::SmallSystem& system, const SmallState& like)
+        : SystemAdapter<python::SmallSystem, SmallState>(system, like)
+    {
+        step.count = system.guard_count();
+        step.guards.resize((most_taylor_order + 1) * step.count);
+        // Errors are reported before the first step.
+        for (Mode mode = 0; mode < system.series().modes(); ++mode) {
+            if (!system.series().code(mode)) static_cast<void>(recorded(mode));
+        }
+    }
+
+    void prepare_order(int /*order*/) {}
+
+    int compute(Mode mode, double t, const double* x, const TaylorCoefficients<double>& to)
+    {
+        const python::SmallSystem& system = this->system();
+        system.watch().tick();
+        if (const auto code = system.series().code(mode)) {
+            return code(t, x, to.order, to.x, to.guards);
+        }
+        LazyTape& tape = recorded(mode);
+        system.series().count(mode, tape);
+        return tape.compute(t, x, to);
+    }
+    [[nodiscard]] bool is_polynomial(Mode mode)
+    {
+        const python::FormulaSeries& series = this->system().series();
+        return series.code(mode) ? series.is_polynomial(mode) : recorded(mode).is_polynomial();
+    }
+
+    int given_order = 0;
+    Step step;
+
+private:
+    [[nodiscard]] LazyTape& recorded(Mode mode)
+    {
+        const Mode at = mode < this->system().series().modes() ? mode : 0;
+        const auto found = recorded_.find(at);
+        if (found != recorded_.end()) return found->second;
+        LazyTape tape = this->system().series().record(at);
+        if (!tape.is_finite()) throw_constant_not_finite(this->system().name);
+        return recorded_.emplace(at, std::move(tape)).first->second;
+    }
+
+    std::map<Mode, LazyTape> recorded_;
+};
+
+}  // namespace ricochet::detail
+
+namespace ricochet::python {
+
+namespace {
+
+using detail::SmallState;
+
+/// All parts of a run but its steps.
+class SmallRun {
+public:
+    SmallRun(const SmallSystem& system, const State& x0, const Request& request)
+        : table_(system.table()), start_(x0.size()), options_(request.options)
+    {
+        std::ranges::copy(x0, start_.data());
+        setup_.system = &table_;
+        setup_.cancels_by_itself = true;
+        setup_.detector =
+            detail::DetectorTableOf<Extremum, SmallSystem, SmallState>::make(detector_);
+        setup_.detecting = &detector_;
+        setup_.locator = detail::locator_table<Newton>();
+        setup_.locating = &locator_;
+    }
+
+    [[nodiscard]] Record by_name(const SmallSystem& system, MethodName method)
+    {
+        detail::SystemAdapter<SmallSystem, SmallState> adapter(system, start_);
+        setup_.adapter = &adapter;
+        setup_.kernel = &detail::kernel_by_name<SmallState>(method, start_.size());
+        setup_.method_by_name = true;
+        setup_.stepping = detail::written_type<ErrorControlled<MethodByName>>();
+        return record_of(detail::run_whole(setup_, start_, options_));
+    }
+
+    template <std::size_t n>
+    [[nodiscard]] Record by_series(const SmallSystem& system)
+    {
+        detail::StepperAdapter<SmallSystem, SmallState, detail::TaylorOf<n>> adapter(system,
+                                                                                     start_);
+        setup_.adapter = static_cast<detail::SystemAdapter<SmallSystem, SmallState>*>(&adapter);
+        setup_.stepping = detail::written_type<ErrorControlled<Taylor>>();
+        detail::step_by_series<SmallSystem, SmallState, n>(setup_);
+        return record_of(detail::run_whole(setup_, start_, options_));
+    }
+
+private:
+    detail::SystemTable<SmallState> table_;
+    SmallState start_;
+    const Options& options_;
+    Extremum detector_;
+    Newton locator_;
+    detail::RunBindings<SmallState> setup_;
+};
+
+}  // namespace
+
+std::optional<Record> CallbackSource::run_whole(const State& x0, const Request& request,
+                                                SignalWatch& watch) const
+{
+    const std::size_t n = x0.size();
+    const bool fits = small_ && n > 0 && n <= SmallState::room && request.is_plain_or_series();
+    if (!fits || (request.by_series && !series_)) return std::nullopt;
+    require_size(x0);
+    const SmallSystem system(*this, n, watch);
+    SmallRun run(system, x0, request);
+    if (!request.by_series) return run.by_name(system, request.method);
+    switch (n) {
+        case 1: return run.by_series<1>(system);
+        case 2: return run.by_series<2>(system);
+        case 3: return run.by_series<3>(system);
+        default: return run.by_series<4>(system);
+    }
+}
+
+}  // namespace ricochet::python
