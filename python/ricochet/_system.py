@@ -615,11 +615,13 @@ class System:
         if self.formula is not None:
             for name in ("_kept", "_kept_resets", "_kept_source"):
                 vars(self).setdefault(name, Kept())
-            places = self._places() if may_keep else None
-            read = [] if places is None else places
-            flow = self._formulas(args, guards, read)
-            time_reset = self._reset_formulas(args, guards, read)
-            may_keep = places is not None and self._kept.pair[0] is not None
+            before, places = (self._kept.pair[1], self._kept_resets.pair[1]), []
+            flow = self._formulas(args, guards, places)
+            time_reset = self._reset_formulas(args, guards, places)
+            # What is the same for a second run may be so for further ones.
+            may_keep = may_keep and before[0] is self._kept.pair[1] and before[1] is self._kept_resets.pair[1]
+            members = self._places() if may_keep else None
+            may_keep = members is not None
         if watch is not None:
             flow = watch(flow, self.modes is not None)
         source = _ricochet.callback_system(dict(
@@ -636,5 +638,5 @@ class System:
             source.parameters = {name.replace("_", "-"): float(value)
                                  for name, value in dict(self.parameters).items()}
         if may_keep and source.is_free:  # then it holds nothing that refers to this system
-            self._kept_source.pair = vars(self), (tuple(places), source, self._mode_list())
+            self._kept_source.pair = vars(self), ((*members, *places), source, self._mode_list())
         return source

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <numeric>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "ricochet/taylor/detail/lazy_tape.hpp"
@@ -22,18 +23,29 @@ constexpr std::size_t most_program_operations = 10;
 constexpr std::size_t stride = 24;
 static_assert(stride > most_taylor_order + 1);
 
-/// sum of a_j b_{k-j} for j from lo to hi
-[[gnu::always_inline]] inline double convolved(const double* a, const double* b, int k, int lo,
-                                               int hi) noexcept
+/// sum of a_j b_{k-j} for j from lo to hi. Most reach from `from` to k: then the function is known,
+/// and called directly. A call by pointer whose target changes from row to row costs as much as a
+/// dozen terms.
+template <int k, int from>
+[[gnu::always_inline]] inline double convolved(const double* a, const double* b, int lo, int hi)
 {
     if (hi < lo) return 0;
+    if (lo == from && hi == k) return reversed_product<k - from>(a + from, b + (k - from));
     return reversed_products[static_cast<std::size_t>(hi - lo)](a + lo, b + (k - lo));
 }
 
-/// sum of a_j a_{k-j} for j from lo to k - lo
-[[gnu::always_inline]] inline double squared(const double* a, int k, int lo) noexcept
+/// sum of a_j a_{k-j} for j from lo to k - lo, likewise
+template <int k, int from>
+[[gnu::always_inline]] inline double squared(const double* a, int lo)
 {
-    const double twice = 2 * convolved(a, a, k, lo, (k - 1) / 2);
+    constexpr int half = (k - 1) / 2;
+    double twice = 0;
+    if (lo == from && from <= half) {
+        constexpr int last = half < from ? 0 : half - from;
+        twice = 2 * reversed_product<last>(a + from, a + (k - from));
+    } else if (lo <= half) {
+        twice = 2 * reversed_products[static_cast<std::size_t>(half - lo)](a + lo, a + (k - lo));
+    }
     return k % 2 == 0 && lo <= k / 2 ? twice + a[k / 2] * a[k / 2] : twice;
 }
 
@@ -146,32 +158,6 @@ bool LazyTape::append(const Batch& batch, std::vector<std::uint32_t>& sources)
     return true;
 }
 
-int LazyTape::run_program(double t, const double* x, const TaylorCoefficients<double>& to,
-                          int order)
-{
-    start(t, x);
-    const std::size_t n = tape_.states, m = tape_.guards;
-    for (std::size_t place = 0; place < width_; ++place) columns_[place * stride] = rows_[place];
-    columns_[n * stride + 1] = 1;
-    std::copy_n(x, n, to.x);
-    for (int k = 0; k <= order; ++k) {
-        const bool is_last = k == order;
-        if (is_last && m == 0) break;
-        if (k > 0) run_row(k, is_last);
-        const auto at = static_cast<std::size_t>(k);
-        for (std::size_t i = 0; i < m; ++i) {
-            to.guards[at * m + i] = columns_[outputs_[n + i] * stride + at];
-        }
-        if (is_last) break;
-        for (std::size_t i = 0; i < n; ++i) {
-            const double next = columns_[outputs_[i] * stride + at] / (k + 1);
-            columns_[i * stride + at + 1] = next;
-            to.x[(at + 1) * n + i] = next;
-        }
-    }
-    return order;
-}
-
 [[gnu::always_inline]] inline double LazyTape::combined(const Instruction& of, int k) const noexcept
 {
     const double* const columns = columns_.data() + k;
@@ -183,42 +169,107 @@ int LazyTape::run_program(double t, const double* x, const TaylorCoefficients<do
     return sum;
 }
 
-void LazyTape::run_row(int k, bool guards_alone)
+/// Branches rather than a table of jumps, for the reason that `convolved` states.
+template <int k>
+[[gnu::always_inline]] inline void LazyTape::compute_instruction(const Instruction& of)
 {
     double* const columns = columns_.data();
-    for (const Instruction& of : program_) {
-        if (k > of.degree || (guards_alone && !of.for_guards)) continue;  // zeros
-        const double* const a = columns + of.a * stride;
-        const double* const b = columns + of.b * stride;
-        double* const out = columns + of.out * stride;
-        const int upto_a = std::min(of.degree_a, k), upto_b = std::min(of.degree_b, k);
-        const auto integral = [&] {
-            return convolved(columns + of.first * stride, b, k, 1, upto_a) / k;
-        };
-        switch (of.step) {
-            case Step::sum: out[k] = a[k] + b[k]; break;
-            case Step::difference: out[k] = a[k] - b[k]; break;
-            case Step::negative: out[k] = -a[k]; break;
-            case Step::copy: out[k] = a[k]; break;
-            case Step::times: out[k] = of.factor * a[k]; break;
-            case Step::combination: out[k] = combined(of, k); break;
-            case Step::slope: out[k] = k * a[k]; break;
-            case Step::product:
-                out[k] = convolved(a, b, k, std::max(0, k - of.degree_b), upto_a);
-                break;
-            case Step::square: out[k] = squared(a, k, std::max(0, k - of.degree_a)); break;
-            case Step::quotient:
-                out[k] = (a[k] - convolved(b, out, k, 1, upto_b)) * inverses_[of.out];
-                break;
-            case Step::constant_over:
-                out[k] = convolved(a, out, k, 1, upto_a) * inverses_[of.out];
-                break;
-            case Step::square_root: out[k] = (a[k] - squared(out, k, 1)) * inverses_[of.out]; break;
-            case Step::function: out[k] = integral(); break;
-            case Step::cosine: out[k] = -integral(); break;
-            case Step::tangent: out[k] = a[k] + integral(); break;
-            case Step::hyperbolic_tangent: out[k] = a[k] - integral(); break;
+    const double* const a = columns + of.a * stride;
+    const double* const b = columns + of.b * stride;
+    double* const out = columns + of.out * stride;
+    const int upto_a = std::min(of.degree_a, k), upto_b = std::min(of.degree_b, k);
+    const Step step = of.step;
+    double& next = out[k];
+    if (step == Step::product) {
+        next = convolved<k, 0>(a, b, std::max(0, k - of.degree_b), upto_a);
+    } else if (step == Step::combination) {
+        next = combined(of, k);
+    } else if (step == Step::square) {
+        next = squared<k, 0>(a, std::max(0, k - of.degree_a));
+    } else if (step >= Step::function) {
+        const double sum = convolved<k, 1>(columns + of.first * stride, b, 1, upto_a) / k;
+        if (step == Step::function) {
+            next = sum;
+        } else if (step == Step::cosine) {
+            next = -sum;
+        } else {
+            next = step == Step::tangent ? a[k] + sum : a[k] - sum;
         }
+    } else if (step >= Step::quotient) {
+        const double inverse = inverses_[of.out];
+        if (step == Step::quotient) {
+            next = (a[k] - convolved<k, 1>(b, out, 1, upto_b)) * inverse;
+        } else if (step == Step::constant_over) {
+            next = convolved<k, 1>(a, out, 1, upto_a) * inverse;
+        } else {
+            next = (a[k] - squared<k, 1>(out, 1)) * inverse;
+        }
+    } else if (step >= Step::times) {
+        next = (step == Step::slope ? k : of.factor) * a[k];
+    } else if (step >= Step::negative) {
+        next = step == Step::negative ? -a[k] : a[k];
+    } else {
+        next = step == Step::sum ? a[k] + b[k] : a[k] - b[k];
+    }
+}
+
+/// Coefficient k of all operations, or of what the guards depend on where it is the last one; true
+/// if there are more.
+template <int k>
+[[gnu::always_inline]] inline bool LazyTape::run_row(int order,
+                                                     const TaylorCoefficients<double>& to)
+{
+    const bool is_last = k == order;
+    if (is_last && tape_.guards == 0) return false;
+    for (const Instruction& of : program_) {
+        if (k > of.degree || (is_last && !of.for_guards)) continue;  // zeros
+        compute_instruction<k>(of);
+    }
+    if (is_last) {
+        keep_guard_columns(k, to.guards);
+    } else {
+        advance_columns(k, to);
+    }
+    return !is_last;
+}
+
+int LazyTape::run_program(double t, const double* x, const TaylorCoefficients<double>& to,
+                          int order)
+{
+    start(t, x);
+    const std::size_t n = tape_.states;
+    for (std::size_t place = 0; place < width_; ++place) columns_[place * stride] = rows_[place];
+    columns_[n * stride + 1] = 1;
+    std::copy_n(x, n, to.x);
+    advance_columns(0, to);
+    [&]<int... before>(std::integer_sequence<int, before...>)
+    {
+        // Stops behind the last order.
+        static_cast<void>((... && run_row<before + 1>(order, to)));
+    }
+    (std::make_integer_sequence<int, most_taylor_order>{});
+    return order;
+}
+
+/// x_{k+1} = f_k / (k + 1)
+void LazyTape::advance_columns(int k, const TaylorCoefficients<double>& to)
+{
+    const std::size_t n = tape_.states;
+    const auto at = static_cast<std::size_t>(k);
+    keep_guard_columns(k, to.guards);
+    for (std::size_t i = 0; i < n; ++i) {
+        const double next = columns_[outputs_[i] * stride + at] / (k + 1);
+        columns_[i * stride + at + 1] = next;
+        to.x[(at + 1) * n + i] = next;
+    }
+}
+
+void LazyTape::keep_guard_columns(int k, double* guards) const
+{
+    const std::size_t n = tape_.states, m = tape_.guards;
+    const auto at = static_cast<std::size_t>(k);
+    for (std::size_t i = 0; i < m; ++i) {
+        guards[at * m + i] = columns_[outputs_[n + i] * stride + at];
     }
 }
 

@@ -262,7 +262,7 @@ def test_code_of_thirty_operations_takes_few_microseconds_to_make():
     assert 0 < took < 500 and size < 50_000
 
 
-def test_threads_share_code_and_the_memory_is_given_back():
+def test_threads_have_code_in_common_and_the_memory_is_given_back():
     from concurrent.futures import ThreadPoolExecutor
 
     def ends(rate):

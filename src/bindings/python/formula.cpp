@@ -1,6 +1,7 @@
 #include "formula.hpp"
 
 #include "formula_series.hpp"
+#include "ricochet/taylor/detail/taylor_adapter.hpp"
 
 #include <algorithm>
 #include <span>
@@ -92,6 +93,14 @@ double formula_guard(std::uint32_t mode, double t, const double* x, std::size_t 
     double value = 0;
     formulas.in(mode).compute(t, x, &value);
     return value;
+}
+
+const detail::LazyTape& FormulaSeries::tape(Mode mode, const std::string& name) const
+{
+    InMode& of = in(mode);
+    std::call_once(of.recorded, [&] { of.tape = record(mode); });
+    if (!of.tape.is_finite()) detail::throw_constant_not_finite(name);
+    return of.tape;
 }
 
 detail::LazyTape FormulaSeries::record(Mode mode) const

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <mutex>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -33,8 +35,9 @@ public:
     [[nodiscard]] SeriesCode code(Mode mode) const noexcept { return in(mode).code.get(); }
     /// Whether the motion is a polynomial; known with the code.
     [[nodiscard]] bool is_polynomial(Mode mode) const noexcept { return in(mode).is_polynomial; }
-    /// The operations in a mode.
-    [[nodiscard]] detail::LazyTape record(Mode mode) const;
+    /// The operations in a mode, recorded once; runs compute with copies.
+    /// @throws std::invalid_argument  a constant is not finite; `name` is that of the system
+    [[nodiscard]] const detail::LazyTape& tape(Mode mode, const std::string& name) const;
     /// Counts a step that was computed by the tape.
     void count(Mode mode, const detail::LazyTape& tape) const noexcept
     {
@@ -50,7 +53,10 @@ private:
     struct InMode {
         LateCode<SeriesCode> code;
         bool is_polynomial = false;
+        std::once_flag recorded;
+        detail::LazyTape tape;
     };
+    [[nodiscard]] detail::LazyTape record(Mode mode) const;
     [[nodiscard]] InMode& in(Mode mode) const noexcept
     {
         return *modes_[mode < modes_.size() ? mode : 0];

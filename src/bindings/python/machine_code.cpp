@@ -306,8 +306,8 @@ private:
 
 // --- series ---
 
-/// Number of sums of products up to which each is written where it is needed. Others are functions
-/// that all sums of a length share: code that does not fit into the caches is slow.
+/// Number of sums of products up to which each is written where it is needed. Otherwise there is
+/// one function for each length: code that does not fit into the caches is slow.
 constexpr std::size_t most_straight_sums = 6;
 /// Number of operations from which on they are computed faster side by side.
 constexpr std::size_t most_series_operations = 50;
@@ -471,7 +471,7 @@ private:
             }
         }
     }
-    /// The functions of the sums that are shared, before the function itself.
+    /// Writes a function for each length of a sum, before the main one.
     void emit_sums(int most)
     {
         main_at_ = jump();

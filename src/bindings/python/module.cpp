@@ -55,7 +55,7 @@ std::optional<std::pair<Numbers, Numbers>> series_of(const ricochet::python::Mod
                                                      bool by_code)
 {
     const ricochet::python::FormulaSeries series(flow, {&guard});
-    ricochet::detail::LazyTape tape = series.record(0);
+    ricochet::detail::LazyTape tape = series.tape(0, "formula");
     constexpr std::size_t rows = ricochet::detail::most_taylor_order + 1;
     Numbers out(rows * x.size()), guards(rows);
     if (!by_code) {
@@ -73,7 +73,7 @@ std::pair<double, std::size_t> time_to_make_series(const ricochet::python::Moded
                                                    const ricochet::python::ModedFormula& guard)
 {
     const ricochet::python::FormulaSeries series(flow, {&guard});
-    const ricochet::detail::LazyTape tape = series.record(0);
+    const ricochet::detail::LazyTape& tape = series.tape(0, "formula");
     const auto start = std::chrono::steady_clock::now();
     const ricochet::python::MachineCode code = ricochet::python::code_of_series(tape);
     const std::chrono::duration<double, std::micro> took = std::chrono::steady_clock::now() - start;

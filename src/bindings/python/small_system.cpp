@@ -202,9 +202,8 @@ private:
         const Mode at = mode < this->system().series().modes() ? mode : 0;
         const auto found = recorded_.find(at);
         if (found != recorded_.end()) return found->second;
-        LazyTape tape = this->system().series().record(at);
-        if (!tape.is_finite()) throw_constant_not_finite(this->system().name);
-        return recorded_.emplace(at, std::move(tape)).first->second;
+        const python::SmallSystem& system = this->system();
+        return recorded_.emplace(at, system.series().tape(at, system.name)).first->second;
     }
 
     std::map<Mode, LazyTape> recorded_;

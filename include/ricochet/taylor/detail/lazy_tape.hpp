@@ -40,7 +40,7 @@ public:
     /// motion is a polynomial. Returns their number.
     int compute(double t, const double* x, const TaylorCoefficients<double>& to);
 
-    // What is computed, for other ways to compute it.
+    // What is computed, for code that does the same.
 
     /// As in `TaylorTape`.
     struct Tape {
@@ -146,7 +146,12 @@ private:
     void write_program();
     [[nodiscard]] bool append(const Batch& batch, std::vector<std::uint32_t>& sources);
     int run_program(double t, const double* x, const TaylorCoefficients<double>& to, int order);
-    void run_row(int k, bool guards_alone);
+    template <int k>
+    bool run_row(int order, const TaylorCoefficients<double>& to);
+    template <int k>
+    void compute_instruction(const Instruction& of);
+    void advance_columns(int k, const TaylorCoefficients<double>& to);
+    void keep_guard_columns(int k, double* guards) const;
     [[nodiscard]] double combined(const Instruction& of, int k) const noexcept;
 
     void start(double t, const double* x);
