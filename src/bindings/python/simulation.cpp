@@ -168,23 +168,29 @@ PyRun integrate(const std::shared_ptr<Source>& source, const State& x0, const py
     return run_of(source, x0, std::move(request), mode_names);
 }
 
-[[nodiscard]] bool is_plain(const py::handle& value)
+[[nodiscard]] bool is_plain_number(const py::handle& value)
 {
     return PyFloat_CheckExact(value.ptr()) || PyLong_CheckExact(value.ptr()) ||
-           PyBool_Check(value.ptr()) || PyUnicode_CheckExact(value.ptr());
+           PyBool_Check(value.ptr());
 }
 
 /// Whether `integrate` in Python would pass these options on as they are.
 [[nodiscard]] bool are_plain_options(const py::dict& given)
 {
-    // Names in a call are interned, and so are these, which Python translates.
-    static const std::array<PyObject*, 5> translated{
-        PyUnicode_InternFromString("mode"), PyUnicode_InternFromString("gate"),
-        PyUnicode_InternFromString("sample_times"), PyUnicode_InternFromString("record_steps"),
-        PyUnicode_InternFromString("t_end")};
+    // Names in a call are interned, and so are these.
+    const auto interned = [](const auto*... names) {
+        return std::array{PyUnicode_InternFromString(names)...};
+    };
+    static const auto translated =
+        interned("mode", "gate", "sample_times", "record_steps", "t_end");  // by Python
+    static const auto texts = interned("method", "detector", "locator");
+    const auto is_one_of = [](const auto& names, const py::handle& key) {
+        return std::ranges::find(names, key.ptr()) != names.end();
+    };
     for (const auto& [key, value] : given) {
-        if (!PyUnicode_CHECK_INTERNED(key.ptr()) || !is_plain(value)) return false;
-        if (std::ranges::find(translated, key.ptr()) != translated.end()) return false;
+        if (!PyUnicode_CHECK_INTERNED(key.ptr()) || is_one_of(translated, key)) return false;
+        const bool is_text = PyUnicode_CheckExact(value.ptr()) && is_one_of(texts, key);
+        if (!is_text && !is_plain_number(value)) return false;
     }
     return true;
 }
