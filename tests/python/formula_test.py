@@ -271,6 +271,114 @@ def test_kept_formulas_do_not_hinder_copies_and_threads():
     assert set(ends) == {expected}
 
 
+SCALE = [2.0]
+
+
+def scaled(x, by=1.0, *, more=1.0):
+    return SCALE[0] * by * more * x
+
+
+def test_a_system_that_is_kept_sees_every_change():
+    cell, table, array = 1.0, {"a": 1.0}, np.array([1.0, 2.0])
+
+    class Growth(ricochet.System):
+        formula = 1
+        rate = 0.1
+
+        def __init__(self):
+            super().__init__()
+            self.offset = 0.0
+            self.guards = [ricochet.Guard(lambda t, x: x[0] - 1.2, direction=1)]
+
+        def flow(self, t, x):
+            return [scaled(x[0]) * self.rate + self.offset + cell + table["a"] + array[1] * flow_of.factor]
+
+    def flow_of():
+        return None
+
+    flow_of.factor = 1.0
+    system = Growth()
+
+    def end():
+        run = ricochet.integrate(system, [1.0], 0.1)
+        return run.x[0], run.events["t"].tolist()
+
+    def change_cell():
+        nonlocal cell
+        cell = 2.0
+
+    def other_code(x, by=1.0, *, more=1.0):
+        return 7.0 * by * more * x
+
+    changes = (
+        change_cell, lambda: table.__setitem__("a", 3.0), lambda: array.__setitem__(1, 5.0),
+        lambda: SCALE.__setitem__(0, 4.0), lambda: setattr(flow_of, "factor", 2.0),
+        lambda: setattr(system, "offset", 0.5), lambda: setattr(Growth, "rate", 0.2),
+        lambda: setattr(system, "rate", 0.3), lambda: setattr(scaled, "__defaults__", (2.0,)),
+        lambda: scaled.__kwdefaults__.__setitem__("more", 3.0),
+        lambda: setattr(scaled, "__code__", other_code.__code__),
+        lambda: setattr(Growth, "flow", lambda self, t, x: [1.0 + 0 * x[0]]),
+        lambda: system.guards.__setitem__(0, ricochet.Guard(lambda t, x: x[0] - 1.05, direction=1)),
+        lambda: system.guards.append(ricochet.Guard(lambda t, x: x[0] - 1.07, direction=1)),
+        lambda: setattr(system, "guards", []))
+    seen = []
+    kept = scaled.__code__, dict(scaled.__kwdefaults__)
+    try:
+        for change in (lambda: None, *changes):
+            change()
+            first = end()
+            assert seen[-1:] != [first]
+            seen.append(first)
+            assert [end(), end(), end()] == 3 * [first]
+            assert system._kept_run() is not None
+    finally:
+        SCALE[0] = 2.0
+        scaled.__code__, scaled.__kwdefaults__, scaled.__defaults__ = *kept, (1.0,)
+
+
+def test_a_copy_of_a_system_that_is_kept_is_another_one():
+    import copy
+
+    class Shift(ricochet.System):
+        formula = 1
+        offset = 0.0
+
+        def flow(self, t, x):
+            return [self.offset + 0 * x[0]]
+
+    first = Shift()
+    for _ in range(3):
+        assert ricochet.integrate(first, [0.0], 1.0).x[0] == 0
+    second = copy.copy(first)
+    second.offset = 2.0
+    for _ in range(3):
+        assert ricochet.integrate(second, [0.0], 1.0).x[0] == pytest.approx(2.0)
+        assert ricochet.integrate(first, [0.0], 1.0).x[0] == 0
+
+
+def test_systems_that_are_kept_are_given_back():
+    import gc
+    import weakref
+
+    class Fall(ricochet.System):
+        formula = 2
+
+        def __init__(self):
+            super().__init__()
+            self.own = self.flow  # a cycle
+
+        def flow(self, t, x):
+            return [x[1], -9.81]
+
+    system = Fall()
+    for _ in range(3):
+        ricochet.integrate(system, [10.0, 0.0], 1.0)
+    gone = weakref.ref(system)
+    del system
+    gc.collect()
+    assert gone() is None
+
+
 def test_modes_args_and_guards_have_their_own_formulas():
     system = ricochet.System(lambda mode, t, x: [1.0 if mode == "up" else -1.0 + 0 * x[0]],
                              modes=("up", "down"), formula=1)
