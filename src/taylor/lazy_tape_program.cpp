@@ -23,30 +23,37 @@ constexpr std::size_t most_side_by_side = 3;
 constexpr std::size_t most_program_operations = 64;
 
 /// Distance of two places in the columns: a column ends with a coefficient beyond the last order.
-constexpr std::size_t stride = 24;
+constexpr std::uint32_t stride = 24;
 static_assert(stride > most_taylor_order + 1);
 
-/// sum of a_j b_{k-j} for j from lo to hi. Most reach from `from` to k: then the function is known,
-/// and called directly. A call by pointer whose target changes from row to row costs as much as a
-/// dozen terms.
+/// sum of a_j b_{k-j} for j from `from` to k, of series of these degrees. Where both have no end
+/// the function is known, and called directly: a call by pointer whose target changes from row to
+/// row costs as much as a dozen terms.
 template <int k, int from>
-[[gnu::always_inline]] inline double convolved(const double* a, const double* b, int lo, int hi)
+[[gnu::always_inline]] inline double convolved(const double* a, const double* b, bool endless,
+                                               int degree_a, int degree_b)
 {
+    if (endless) return reversed_product<k - from>(a + from, b + (k - from));
+    const int lo = std::max(from, k - degree_b), hi = std::min(degree_a, k);
     if (hi < lo) return 0;
-    if (lo == from && hi == k) return reversed_product<k - from>(a + from, b + (k - from));
     return reversed_products[static_cast<std::size_t>(hi - lo)](a + lo, b + (k - lo));
 }
 
 /// sum of a_j a_{k-j} for j from lo to k - lo, likewise
 template <int k, int from>
-[[gnu::always_inline]] inline double squared(const double* a, int lo)
+[[gnu::always_inline]] inline double squared(const double* a, bool endless, int degree)
 {
     constexpr int half = (k - 1) / 2;
+    if (endless) {
+        double twice = 0;
+        if constexpr (from <= half) {
+            twice = 2 * reversed_product<half - from>(a + from, a + (k - from));
+        }
+        return k % 2 == 0 && from <= k / 2 ? twice + a[k / 2] * a[k / 2] : twice;
+    }
+    const int lo = std::max(from, k - degree);
     double twice = 0;
-    if (lo == from && from <= half) {
-        constexpr int last = half < from ? 0 : half - from;
-        twice = 2 * reversed_product<last>(a + from, a + (k - from));
-    } else if (lo <= half) {
+    if (lo <= half) {
         twice = 2 * reversed_products[static_cast<std::size_t>(half - lo)](a + lo, a + (k - lo));
     }
     return k % 2 == 0 && lo <= k / 2 ? twice + a[k / 2] * a[k / 2] : twice;
@@ -136,8 +143,12 @@ bool LazyTape::append(const Batch& batch, std::vector<std::uint32_t>& sources)
     if (batch.pass == Pass::slope) kind = KindOf<Step>{Step::slope};
     if (batch.pass == Pass::combination) kind = KindOf<Step>{Step::combination};
     if (!kind) return false;
+    // Sums whose terms go on to the newest coefficients.
+    const bool a_ends = kind->step != Step::quotient && batch.degree_a < no_degree;
+    const bool b_ends = kind->step < Step::constant_over && batch.degree_b < no_degree;
     const Instruction each{.step = kind->step,
                            .for_guards = batch.for_guards,
+                           .endless = !a_ends && (kind->step == Step::square || !b_ends),
                            .degree = batch.degree,
                            .degree_a = batch.degree_a,
                            .degree_b = batch.degree_b};
@@ -153,7 +164,8 @@ bool LazyTape::append(const Batch& batch, std::vector<std::uint32_t>& sources)
         next.a = sources[next.a];
         next.b = sources[next.b];
         next.factor = factors_[batch.first + l];
-        if (sloped) next.first = static_cast<std::uint32_t>(batch.slope_a + l);
+        next.first = next.out;
+        if (sloped) next.first = static_cast<std::uint32_t>(batch.slope_a + l) * stride;
         if (each.step == Step::combination) {
             const std::size_t terms = batch.terms.size() / batch.lanes.size();
             next.first = static_cast<std::uint32_t>(program_terms_.size());
@@ -163,6 +175,7 @@ bool LazyTape::append(const Batch& batch, std::vector<std::uint32_t>& sources)
                 program_terms_.back().of *= stride;
             }
         }
+        for (std::uint32_t* column : {&next.out, &next.a, &next.b}) *column *= stride;
         program_.push_back(next);
     }
     return true;
@@ -184,20 +197,21 @@ template <int k>
 [[gnu::always_inline]] inline void LazyTape::compute_instruction(const Instruction& of)
 {
     double* const columns = columns_.data();
-    const double* const a = columns + of.a * stride;
-    const double* const b = columns + of.b * stride;
-    double* const out = columns + of.out * stride;
-    const int upto_a = std::min(of.degree_a, k), upto_b = std::min(of.degree_b, k);
+    const double* const a = columns + of.a;
+    const double* const b = columns + of.b;
+    double* const out = columns + of.out;
+    const bool endless = of.endless;
     const Step step = of.step;
     double& next = out[k];
     if (step == Step::product) {
-        next = convolved<k, 0>(a, b, std::max(0, k - of.degree_b), upto_a);
+        next = convolved<k, 0>(a, b, endless, of.degree_a, of.degree_b);
     } else if (step == Step::combination) {
         next = combined(of, k);
     } else if (step == Step::square) {
-        next = squared<k, 0>(a, std::max(0, k - of.degree_a));
+        next = squared<k, 0>(a, endless, of.degree_a);
     } else if (step >= Step::function) {
-        const double sum = convolved<k, 1>(columns + of.first * stride, b, 1, upto_a) / k;
+        const double sum =
+            convolved<k, 1>(columns + of.first, b, endless, of.degree_a, no_degree) / k;
         if (step == Step::function) {
             next = sum;
         } else if (step == Step::cosine) {
@@ -206,13 +220,13 @@ template <int k>
             next = step == Step::tangent ? a[k] + sum : a[k] - sum;
         }
     } else if (step >= Step::quotient) {
-        const double inverse = inverses_[of.out];
+        const double inverse = inverses_[of.first];
         if (step == Step::quotient) {
-            next = (a[k] - convolved<k, 1>(b, out, 1, upto_b)) * inverse;
+            next = (a[k] - convolved<k, 1>(b, out, endless, of.degree_b, no_degree)) * inverse;
         } else if (step == Step::constant_over) {
-            next = convolved<k, 1>(a, out, 1, upto_a) * inverse;
+            next = convolved<k, 1>(a, out, endless, of.degree_a, no_degree) * inverse;
         } else {
-            next = (a[k] - squared<k, 1>(out, 1)) * inverse;
+            next = (a[k] - squared<k, 1>(out, true, no_degree)) * inverse;
         }
     } else if (step >= Step::times) {
         next = (step == Step::slope ? k : of.factor) * a[k];

@@ -122,10 +122,14 @@ private:
     struct Instruction {
         Step step{};
         bool for_guards = false;
-        int degree = 0;                  ///< of the result
-        int degree_a = 0, degree_b = 0;  ///< of the operands
-        std::uint32_t out = 0, a = 0, b = 0;
-        std::uint32_t first = 0, count = 0;  ///< of the terms of a combination
+        bool endless = false;                 ///< its operands are no polynomials
+        int degree = 0;                       ///< of the result
+        int degree_a = 0, degree_b = 0;       ///< of the operands
+        std::uint32_t out = 0, a = 0, b = 0;  ///< where their columns begin
+        /// Of a combination the first term, of a function the column of the operand's slopes, else
+        /// the place of the result.
+        std::uint32_t first = 0;
+        std::uint32_t count = 0;  ///< of the terms of a combination
         double factor = 0;
     };
 
