@@ -80,7 +80,7 @@ void CallbackSetup<X>::set_detector(const FinderOptions& finders)
 {
     const auto gate = [&] { return gates::Gate(load_model(finders.gate)); };
     const bool is_named = detail::NamedDetectors::at(
-        place_of(finders.detector), [&]<class Detector>() { set_detector(Detector()); });
+        place_of_detector(finders.detector), [&]<class Detector>() { set_detector(Detector()); });
     if (is_named) return;
     switch (finders.detector) {
         case RC_PLANNED: return set_detector(Planned<>());

@@ -151,8 +151,8 @@ public:
         FinderOptions finders{.detector = one_of("detector", from.detector, RC_FORESEEN),
                               .locator = one_of("locator", from.locator, RC_TOMS748),
                               .gate = {}};
-        const bool asks_gate =
-            place_of(finders.detector) == named_detectors.size() && finders.detector != RC_PLANNED;
+        const bool asks_gate = place_of_detector(finders.detector) == named_detectors.size() &&
+                               finders.detector != RC_PLANNED;
         if (asks_gate && !from.gate) refuse("found no gate; expected the path of its model");
         if (!asks_gate && from.gate) refuse("found a gate for a detector that asks none");
         if (asks_gate) finders.gate = from.gate;
@@ -231,7 +231,7 @@ void require_options_of_phases(const RunOptions& options)
     if (options.fixed_step) {
         reader.refuse("found fixed_step = 1 and a system with set_valued; expected error control");
     }
-    if (place_of(options.finders.detector) == named_detectors.size()) {
+    if (place_of_detector(options.finders.detector) == named_detectors.size()) {
         reader.refuse(
             "detector: found one that defers checks and a system with set_valued; expected " +
             alternatives(named_detectors, [](const NamedDetector&) { return true; }));

@@ -23,7 +23,7 @@ inline constexpr std::array named_detectors{NamedDetector{RC_EXTREMUM, "RC_EXTRE
 static_assert(named_detectors.size() == detail::NamedDetectors::size);
 
 /// The place in this list; its size for a detector that needs bounds or a gate.
-[[nodiscard]] constexpr std::size_t place_of(rc_detector detector) noexcept
+[[nodiscard]] constexpr std::size_t place_of_detector(rc_detector detector) noexcept
 {
     std::size_t place = 0;
     while (place < named_detectors.size() && named_detectors[place].value != detector) ++place;
