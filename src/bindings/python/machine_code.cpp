@@ -308,7 +308,7 @@ private:
 
 /// Number of sums of products up to which each is written where it is needed. Otherwise there is
 /// one function for each length: code that does not fit into the caches is slow.
-constexpr std::size_t most_straight_sums = 6;
+constexpr int most_straight_sums = 6;
 /// Number of operations from which on they are computed faster side by side.
 constexpr std::size_t most_series_operations = 50;
 
