@@ -125,6 +125,11 @@ def _function(function, seen):
     return tuple(out)
 
 
+def _is_fixed(cls):
+    """Whether a class is of this package, or `object`."""
+    return cls is object or cls.__module__.split(".")[0] == "ricochet"
+
+
 def _members(owner, seen):
     """The attributes of an object that the functions seen may read."""
     own, out = vars(owner), []
@@ -135,7 +140,7 @@ def _members(owner, seen):
                 continue  # the owner's dictionary, and those of its classes, are compared as a whole
             for cls in type(owner).__mro__:
                 if name in vars(cls):
-                    if cls is not object and not cls.__module__.startswith("ricochet"):
+                    if not _is_fixed(cls):
                         out.append((name, _value(vars(cls)[name], seen)))
                     break
     return out
@@ -179,7 +184,7 @@ def places_of_members(owner, values):
         return None
     out = [(DICT, vars(owner), None, dict(vars(owner)))]
     for cls in type(owner).__mro__:
-        if cls is object or cls.__module__.startswith("ricochet"):
+        if _is_fixed(cls):
             continue
         members = dict(vars(cls))
         if any(isinstance(member, property) for member in members.values()) or (
