@@ -46,7 +46,7 @@ function(ricochet_small_sources)
     set(ricochet_small
         bouncing_ball.cpp buck_converter.cpp coulomb_oscillator.cpp impact_oscillator.cpp outcome.cpp pendulum.cpp
         model_metadata.cpp safetensors.cpp self_test.cpp snapshot.cpp stick_slip.cpp thermostat.cpp)
-    set(ricochet_python_small callbacks.cpp ensemble.cpp filippov.cpp gates.cpp implicit.cpp numbers.cpp)
+    set(ricochet_python_small callbacks.cpp ensemble.cpp filippov.cpp gates.cpp implicit.cpp machine_code.cpp numbers.cpp)
     foreach(target IN ITEMS ricochet ricochet_scene ricochet_python)
         if(NOT TARGET ${target})
             continue()
