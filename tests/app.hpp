@@ -22,6 +22,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/detect/named_detectors.hpp"
+#include "ricochet/methods.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 
 extern char** environ;
@@ -30,6 +32,22 @@ namespace ricochet {
 
 namespace fs = std::filesystem;
 using Words = std::vector<std::string>;
+
+/// Methods with an error estimate, and any others, by name.
+inline Words steppers(Words others = {})
+{
+    for (const detail::NamedMethod& method : detail::named_methods) {
+        if (method.estimates_error) others.emplace_back(method.spelled);
+    }
+    return others;
+}
+
+/// The detectors that every system may be run with.
+inline Words detectors(Words others = {})
+{
+    others.insert(others.end(), detail::detector_names.begin(), detail::detector_names.end());
+    return others;
+}
 
 inline std::string content(const fs::path& file)
 {

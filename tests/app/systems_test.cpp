@@ -94,14 +94,14 @@ TEST_F(App, SimulateReachesTheEndOfEverySystemWithEveryStepperAndDetector)
     Words all = with_guards;
     all.insert(all.end(), with_time_events.begin(), with_time_events.end());
     std::vector<Words> steppings;
-    for (const char* stepper : {"dopri5", "fehlberg78", "cash-karp54"}) {
+    for (const std::string& stepper : steppers()) {
         steppings.push_back({"--stepper", stepper});
         steppings.push_back({"--stepper", stepper, "--step", "0.001"});
     }
     steppings.push_back({"--stepper", "rk4", "--step", "0.001"});
     for (const std::string& name : all) {
         for (const Words& stepping : steppings) {
-            for (const char* detector : {"ends", "extremum", "bernstein"}) {
+            for (const std::string& detector : detectors()) {
                 Words words{"simulate", name, "--json", "--detector", detector};
                 words.insert(words.end(), stepping.begin(), stepping.end());
                 SCOPED_TRACE(name + ' ' + detector + ' ' + stepping[1]);
@@ -109,7 +109,7 @@ TEST_F(App, SimulateReachesTheEndOfEverySystemWithEveryStepperAndDetector)
                 EXPECT_EQ(run["outcome"], "reached_end");
                 EXPECT_EQ(run["detector"], detector);
                 // The ends alone may miss events near a tangent.
-                EXPECT_TRUE(run["events"].size() > 0 || detector == std::string("ends"));
+                EXPECT_TRUE(run["events"].size() > 0 || detector == "ends");
             }
         }
     }
