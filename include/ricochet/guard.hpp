@@ -100,15 +100,6 @@ namespace detail {
     return false;
 }
 
-/// Whether a guard armed on `side`, with the value `g_end` at the end of a step, has
-/// triggered. The end is included, so a zero on the boundary of two steps counts
-/// once; the start is represented by `side`, so a step that begins on the
-/// surface, as after a bounce, is assessed like any other.
-[[nodiscard]] constexpr bool triggers(Side side, double g_end, Crossing crossing) noexcept
-{
-    return has_left(side, g_end) && counts(side, crossing);
-}
-
 }  // namespace detail
 
 // An event: when a guard crossed its surface, and the states around it.

@@ -229,7 +229,6 @@ public:
 
     /// Number of weights of the rates in w on the dense output.
     static constexpr std::size_t dense_weights_count = Tableau::stages + 1;
-    using DenseArray = std::array<double, dense_weights_count>;
 
     /// w(s) on the dense output of the step of length h; `rate` is the rate of the departures at
     /// the end.

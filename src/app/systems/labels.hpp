@@ -30,13 +30,4 @@ template <class System>
     return out;
 }
 
-/// The same, and the mode of set-valued steps.
-template <class System>
-[[nodiscard]] std::vector<std::string_view> mode_names_and_set_valued()
-{
-    std::vector<std::string_view> out = mode_names<System>();
-    out.push_back("set-valued");
-    return out;
-}
-
 }  // namespace ricochet::app

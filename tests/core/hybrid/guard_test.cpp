@@ -7,8 +7,15 @@
 namespace ricochet::guard_test {
 namespace {
 
+using detail::counts;
+using detail::has_left;
 using detail::opposite;
-using detail::triggers;
+
+/// Whether a guard that was armed on `side` has an event at the end of a step.
+bool triggers(Side side, double g_end, Crossing crossing)
+{
+    return has_left(side, g_end) && counts(side, crossing);
+}
 
 TEST(Guard, AFallingCrossingTriggersOnlyFromAbove)
 {
