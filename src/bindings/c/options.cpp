@@ -25,7 +25,8 @@ constexpr std::array<Method, 5> methods{{
     {RC_RK4, MethodName::rk4, "RC_RK4"},
     {RC_EULER, MethodName::euler, "RC_EULER"},
 }};
-static_assert(methods.size() == detail::named_methods.size());
+static_assert(methods.size() == detail::named_methods.size(),
+              "a method of detail::NamedMethods has no line here");
 
 /// "A, B or C" of those that belong.
 template <class List, class Belongs>
@@ -148,7 +149,7 @@ public:
     template <class T>
     [[nodiscard]] FinderOptions finders(const T& from) const
     {
-        FinderOptions finders{.detector = one_of("detector", from.detector, RC_FORESEEN),
+        FinderOptions finders{.detector = one_of("detector", from.detector, last_detector),
                               .locator = one_of("locator", from.locator, RC_TOMS748),
                               .gate = {}};
         const bool asks_gate = place_of_detector(finders.detector) == named_detectors.size() &&

@@ -20,7 +20,9 @@ struct NamedDetector {
 inline constexpr std::array named_detectors{NamedDetector{RC_EXTREMUM, "RC_EXTREMUM"},
                                             NamedDetector{RC_ENDS, "RC_ENDS"},
                                             NamedDetector{RC_BERNSTEIN, "RC_BERNSTEIN"}};
-static_assert(named_detectors.size() == detail::NamedDetectors::size);
+static_assert(named_detectors.size() == detail::NamedDetectors::size,
+              "a detector of detail::NamedDetectors has no line here");
+inline constexpr rc_detector last_detector = RC_FORESEEN;  ///< largest value of the enumeration
 
 /// The place in this list; its size for a detector that needs bounds or a gate.
 [[nodiscard]] constexpr std::size_t place_of_detector(rc_detector detector) noexcept
