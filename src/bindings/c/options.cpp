@@ -18,13 +18,11 @@ struct Method {
     MethodName name;
     const char* spelled;
 };
-constexpr std::array<Method, 5> methods{{
-    {RC_DOPRI5, MethodName::dopri5, "RC_DOPRI5"},
-    {RC_FEHLBERG78, MethodName::fehlberg78, "RC_FEHLBERG78"},
-    {RC_CASH_KARP54, MethodName::cash_karp54, "RC_CASH_KARP54"},
-    {RC_RK4, MethodName::rk4, "RC_RK4"},
-    {RC_EULER, MethodName::euler, "RC_EULER"},
-}};
+constexpr std::array methods{Method{RC_DOPRI5, MethodName::dopri5, "RC_DOPRI5"},
+                             Method{RC_FEHLBERG78, MethodName::fehlberg78, "RC_FEHLBERG78"},
+                             Method{RC_CASH_KARP54, MethodName::cash_karp54, "RC_CASH_KARP54"},
+                             Method{RC_RK4, MethodName::rk4, "RC_RK4"},
+                             Method{RC_EULER, MethodName::euler, "RC_EULER"}};
 static_assert(methods.size() == detail::named_methods.size(),
               "a method of detail::NamedMethods has no line here");
 
