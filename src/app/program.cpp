@@ -223,7 +223,8 @@ void add_simulate(CLI::App& app, int& status, SimulateHandler handler)
     add_text(command, "--phase", request->phase, "U,V",
              "draw the component V of the state over U instead of all over time");
     add_text(command, "--kernel", request->kernel, "FILE",
-             "of fault: stresses for slip, a .npy file [1/km], in place of the medium's");
+             "of fault: stresses for slip, a .npy or .safetensors file [1/km], in place of the "
+             "medium's");
     command.footer(
         "Examples:\n"
         "  ricochet simulate bouncing-ball --set restitution=0.8 --plot ball.svg\n"

@@ -35,4 +35,12 @@ namespace ricochet {
 /// @throws std::invalid_argument naming the file and what was found and expected.
 [[nodiscard]] Eigen::MatrixXd read_npy_square(const std::filesystem::path& file);
 
+/// The only tensor of a safetensors file, a square matrix of F64 or F32.
+/// @throws std::invalid_argument naming the file and what was found and expected.
+[[nodiscard]] Eigen::MatrixXd read_safetensors_square(const std::filesystem::path& file);
+
+/// The matrix of a file whose name ends in .safetensors, or of a NumPy file.
+/// @throws std::invalid_argument naming the file and what was found and expected.
+[[nodiscard]] Eigen::MatrixXd read_kernel(const std::filesystem::path& file);
+
 }  // namespace ricochet

@@ -66,7 +66,7 @@ FaultStiffness half_space(const StrikeSlipFault::Parameters& p, double element, 
 
 FaultStiffness from_file(const StrikeSlipFault::Parameters& p)
 {
-    Eigen::MatrixXd kernel = read_npy_square(p.kernel);
+    Eigen::MatrixXd kernel = read_kernel(p.kernel);
     try {
         if (kernel.diagonal().maxCoeff() >= 0) {
             throw std::invalid_argument(fmt::format(

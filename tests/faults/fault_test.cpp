@@ -236,6 +236,42 @@ TEST_F(KernelFile, ThatDoesNotFitIsRefused)
     EXPECT_TRUE(contains(refusal_of(Eigen::MatrixXd::Zero(2, 3), 1), "square"));
 }
 
+TEST_F(KernelFile, OfSafetensorsIsReadAsNumPysIs)
+{
+    const auto with = [this](const std::string& header, std::size_t numbers) {
+        std::string bytes(8, '\0');
+        bytes[0] = static_cast<char>(header.size());
+        bytes += header;
+        for (std::size_t i = 0; i < numbers; ++i) {
+            const auto number = static_cast<float>(i + 1);
+            bytes += std::string(reinterpret_cast<const char*>(&number), sizeof number);
+        }
+        std::ofstream(file_, std::ios::binary) << bytes;
+        Eigen::MatrixXd found;
+        const std::string message = refusal([&] { found = read_safetensors_square(file_); });
+        return std::pair(message, found);
+    };
+    const auto [message, matrix] =
+        with(R"({"kernel":{"dtype":"F32","shape":[2,2],"data_offsets":[0,16]}})", 4);
+    EXPECT_EQ(message, "accepted");
+    EXPECT_EQ(matrix, (Eigen::Matrix2d{{1, 2}, {3, 4}}));  // by rows
+    EXPECT_TRUE(
+        contains(with(R"({"kernel":{"dtype":"F32","shape":[4],"data_offsets":[0,16]}})", 4).first,
+                 "expected a square matrix, found shape [4]"));
+    EXPECT_TRUE(
+        contains(with(R"({"kernel":{"dtype":"F32","shape":[2,2],"data_offsets":[0,16]}})", 3).first,
+                 "a range within 12 bytes of data"));
+    EXPECT_TRUE(contains(with("{}", 0).first, "expected one tensor, found 0"));
+    EXPECT_TRUE(contains(with("nonsense", 0).first, "expected JSON"));
+    std::ofstream(file_, std::ios::binary) << "short";
+    EXPECT_TRUE(
+        contains(refusal([&] { (void)read_safetensors_square(file_); }), "ends before its header"));
+    const fs::path named = file_.string() + ".safetensors";
+    std::ofstream(named, std::ios::binary) << "short";
+    EXPECT_TRUE(contains(refusal([&] { (void)read_kernel(named); }), "ends before its header"));
+    fs::remove(named);
+}
+
 TEST_F(KernelFile, WhoseHeaderSaysOtherThingsIsRefused)
 {
     const auto with = [this](std::string header) {

@@ -73,8 +73,9 @@ public:
         double overload = 1e-5;          ///< positive
         FaultMedium medium = FaultMedium::full_space;
         FaultMesh mesh = FaultMesh::plain;
-        /// A .npy file with the stresses due to slip, n^2 x n^2 [1/km], symmetric and negative
-        /// definite, to be used instead of those of the medium; the mesh must be plain.
+        /// A .npy or .safetensors file with the stresses due to slip, n^2 x n^2 [1/km], symmetric
+        /// and negative definite, to be used instead of those of the medium; the mesh must be
+        /// plain.
         std::filesystem::path kernel{};
         double memory_limit = 1073741824;  ///< [bytes], positive
     };

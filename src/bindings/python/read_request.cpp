@@ -38,6 +38,18 @@ namespace {
     throw py::value_error("found '" + name + "', expected one of " + all);
 }
 
+[[nodiscard]] const std::vector<std::string_view>& known_detectors()
+{
+    static const std::vector<std::string_view> all = [] {
+        std::vector<std::string_view> names(detail::detector_names.begin(),
+                                            detail::detector_names.end());
+        names.insert(names.end(), {"planned", "calibrated", "calibrated-bounds", "foreseen",
+                                   "certified", "network"});
+        return names;
+    }();
+    return all;
+}
+
 using Setter = void (*)(Request&, const py::handle&);
 
 /// @throws py::type_error saying what was found and what was expected.
@@ -98,14 +110,7 @@ void set(Request& request, const py::handle& value)
          [](Request& request, const py::handle& value) { request.fixed = read_as<bool>(value); }},
         {"detector",
          [](Request& request, const py::handle& value) {
-             static const std::vector<std::string_view> known = [] {
-                 std::vector<std::string_view> all(detail::detector_names.begin(),
-                                                   detail::detector_names.end());
-                 all.insert(all.end(), {"planned", "calibrated", "calibrated-bounds", "foreseen",
-                                        "certified", "network"});
-                 return all;
-             }();
-             request.detector = one_of(read_as<std::string>(value), known);
+             request.detector = one_of(read_as<std::string>(value), known_detectors());
          }},
         {"gate",
          [](Request& request, const py::handle& value) {

@@ -1,4 +1,5 @@
-// NumPy's file format, as numpy.lib.format describes it: versions 1 to 3.
+// Square matrices from files: NumPy's format, as numpy.lib.format describes it (versions 1 to 3),
+// and safetensors.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -14,6 +15,7 @@
 
 #include "base/read_file.hpp"
 #include "fault_kernel.hpp"
+#include "nn/safetensors_header.hpp"
 
 namespace ricochet {
 
@@ -103,6 +105,11 @@ Eigen::MatrixXd matrix(const char* data, std::uint64_t side)
     return out.template cast<double>();
 }
 
+void require_finite(const std::filesystem::path& file, const Eigen::MatrixXd& matrix)
+{
+    if (!matrix.allFinite()) refuse(file, "has entries that are not numbers, or infinite");
+}
+
 }  // namespace
 
 Eigen::MatrixXd read_npy_square(const std::filesystem::path& file)
@@ -120,9 +127,54 @@ Eigen::MatrixXd read_npy_square(const std::filesystem::path& file)
     const char* data = bytes.data() + header.data;
     Eigen::MatrixXd out =
         header.single ? matrix<float>(data, header.side) : matrix<double>(data, header.side);
-    if (!out.allFinite()) refuse(file, "has entries that are not numbers, or infinite");
+    require_finite(file, out);
     if (!header.fortran) out.transposeInPlace();
     return out;
+}
+
+Eigen::MatrixXd read_safetensors_square(const std::filesystem::path& file)
+{
+    constexpr std::size_t length_bytes = 8;
+    constexpr std::size_t longest_header = std::size_t{1} << 20;
+    const std::string bytes = detail::read_file(
+        file, [&](const std::string& why) { refuse(file, "cannot be read: " + why); });
+    std::uint64_t length = 0;
+    if (bytes.size() < length_bytes) refuse(file, "ends before its header");
+    std::memcpy(&length, bytes.data(), length_bytes);
+    if (length > std::min(longest_header, bytes.size() - length_bytes)) {
+        refuse(file, fmt::format("expected a header of at most {} bytes within the file, found {}",
+                                 longest_header, length));
+    }
+    const std::string_view data = std::string_view(bytes).substr(length_bytes + length);
+    const model_file::Refusal refuse_header(file.string());
+    try {
+        const auto header = model_file::parse_header(
+            std::string_view(bytes).substr(length_bytes, length), refuse_header);
+        model_file::check_places(header, data.size(), refuse_header);
+        if (header.tensors.size() != 1) {
+            refuse(file, fmt::format("expected one tensor, found {}", header.tensors.size()));
+        }
+        const model_file::Tensor& tensor = header.tensors.begin()->second;
+        if (tensor.shape.size() != 2 || tensor.shape[0] != tensor.shape[1] ||
+            tensor.shape[0] == 0) {
+            refuse(file, fmt::format("expected a square matrix, found shape {}",
+                                     model_file::describe(tensor.shape)));
+        }
+        const bool single = tensor.precision == Precision::f32;
+        Eigen::MatrixXd out = single ? matrix<float>(data.data(), tensor.shape[0])
+                                     : matrix<double>(data.data(), tensor.shape[0]);
+        require_finite(file, out);
+        out.transposeInPlace();
+        return out;
+    } catch (const ModelError& error) {
+        throw std::invalid_argument(error.what());
+    }
+}
+
+Eigen::MatrixXd read_kernel(const std::filesystem::path& file)
+{
+    return file.extension() == ".safetensors" ? read_safetensors_square(file)
+                                              : read_npy_square(file);
 }
 
 }  // namespace ricochet
