@@ -45,7 +45,6 @@ int CoulombOscillator::stops(double from) const noexcept
     return n < never ? static_cast<int>(n) : never;
 }
 
-// Long: one list of what the system consists of.
 const SystemDescriptor& CoulombOscillator::descriptor()
 {
     using Numbers = std::span<const double>;
