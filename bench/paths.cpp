@@ -136,7 +136,7 @@ Path circuit()
         auto result =
             hand_over(DiodeCircuit{}, DiodeCircuit::start(),
                       {.t_end = 20, .rtol = 1e-8, .atol = 1e-8}, ErrorControlled<Fehlberg78>{});
-        keep(result.state.t);
+        keep(result.t);
     };
 }
 

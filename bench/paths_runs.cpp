@@ -48,7 +48,7 @@ Path sliding_mode()
     return [] {
         auto result = hand_over(SlidingMode{}, SlidingMode::Vector::Constant(SlidingMode::start),
                                 {.t_end = SlidingMode::t_end, .rtol = 1e-8, .atol = 1e-8});
-        keep(result.state.t);
+        keep(result.t);
     };
 }
 

@@ -26,9 +26,9 @@ int main()
                     event.kind == EventKind::stick ? "sticks" : "slips");
     }
     std::printf("%s at %g s: u %.9f m, friction %.6f N; %llu steps, %zu phase%s\n",
-                name(run.outcome).data(), run.state.t, run.state.w[0], run.state.reaction[0],
-                static_cast<unsigned long long>(run.statistics.event_driven.steps),
-                run.phases.size(), run.phases.size() == 1 ? "" : "s");
+                name(run.outcome).data(), run.t, run.x[0], run.reaction[0],
+                static_cast<unsigned long long>(run.statistics.steps), run.phases.size(),
+                run.phases.size() == 1 ? "" : "s");
     // Slip starts again one period after the start, where it first began.
     return run.events.size() == 4 && std::abs(run.events[1].t - ricochet::StickSlip::period) < 1e-8
                ? 0

@@ -13,8 +13,10 @@ template <class System, class Run>
     constexpr int N = detail::solver_components<System::state_size, System::reaction_size>;
     constexpr int M = detail::solver_reactions<System::state_size, System::reaction_size>;
     const detail::AnyMatrices<N, M> matrices(detail::inclusion_of<N, M>(system));
-    return law_violation(matrices, run.state.t, detail::resized<N>(run.state.w),
-                         detail::resized<M>(run.state.reaction), h);
+    const Eigen::Map<const Eigen::Matrix<double, System::reaction_size, 1>> reaction(
+        run.reaction.data());
+    return law_violation(matrices, run.t, detail::resized<N>(run.x), detail::resized<M>(reaction),
+                         h);
 }
 
 }  // namespace ricochet::test

@@ -209,7 +209,7 @@ void diode_circuit(Parameters p, int points)
         const auto& w = run.trajectory.x[k];
         results.path.insert(results.path.end(), {run.trajectory.t[k], w[0], w[1]});
     }
-    report(describe(run.outcome), run.events.size(), run.statistics.event_driven);
+    report(describe(run.outcome), run.events.size(), run.statistics);
 }
 
 /// The motion of two elastic bodies and a wall, unfolded: in the coordinates sqrt(mass) times

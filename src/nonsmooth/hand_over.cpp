@@ -129,7 +129,6 @@ HandOverOptions with_part_of_steps(HandOverOptions options, bool locate, double 
     }
     constexpr std::uint64_t most = std::numeric_limits<std::uint64_t>::max();
     options.max_steps = options.max_steps <= most / 16 ? 16 * options.max_steps : most;
-    options.estimate_error = false;
     return options;
 }
 

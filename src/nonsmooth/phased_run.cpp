@@ -71,22 +71,6 @@ void refuse_bad_start(const C& x0)
 
 }  // namespace
 
-HandOverStatistics statistics_by_phase(const PhasedCounts& of)
-{
-    HandOverStatistics out{.event_driven = of.all, .set_valued = of.implicit};
-    out.event_driven.steps -= std::min(of.implicit.accepted, of.all.steps);
-    for (std::size_t k = 0; k < of.phases.size(); ++k) {
-        if (!of.phases[k].set_valued) {
-            out.to_events += k > 0;
-            continue;
-        }
-        ++out.to_set_valued;
-        out.set_valued_time += (k + 1 < of.phases.size() ? of.phases[k + 1].from : of.t_end);
-        out.set_valued_time -= of.phases[k].from;
-    }
-    return out;
-}
-
 HandOverOptions options_of_phases(const Options& options)
 {
     Options supported = options;

@@ -103,10 +103,10 @@ void reach_zero(const SlidingMode& system, double from, double exact_time)
     EXPECT_NEAR(run.events[0].t, exact_time, 1e-12);
     EXPECT_NEAR(run.trajectory.x[0][0], system.exact(0.05, from), 1e-12);
     for (std::size_t i = 1; i < 4; ++i) EXPECT_EQ(run.trajectory.x[i][0], 0.0);
-    EXPECT_EQ(run.state.t, 0.5);
-    EXPECT_EQ(run.state.w[0], 0.0);
+    EXPECT_EQ(run.t, 0.5);
+    EXPECT_EQ(run.x[0], 0.0);
     const auto& p = system.parameters();
-    EXPECT_NEAR(run.state.reaction[0], -p.amplitude * std::sin(p.frequency * 0.5), 1e-13);
+    EXPECT_NEAR(run.reaction[0], -p.amplitude * std::sin(p.frequency * 0.5), 1e-13);
 }
 
 /// k t_end / n, k = 0 ... n.
@@ -178,8 +178,8 @@ void follow(const Eigen::Vector3d& start, double t_end, std::size_t changes)
                                           : EventKind::mode);
         before = sign;
     }
-    EXPECT_LE((run.state.w - exact.final).norm(), 1e-10);
-    EXPECT_EQ(run.state.w[0], 0.0);
+    EXPECT_LE((run.x - exact.final).norm(), 1e-10);
+    EXPECT_EQ(run.x[0], 0.0);
     EXPECT_EQ(run.phases.size(), 1u);
 }
 
@@ -209,9 +209,9 @@ TEST(HandOver, CoulombOscillatorTurnsAndRests)
         EXPECT_NEAR(event.before[0], closed.turning_point(n), 1e-10);
         EXPECT_EQ(event.kind, n < 3 ? EventKind::mode : EventKind::stick);
     }
-    EXPECT_EQ(run.state.w[1], 0.0);
+    EXPECT_EQ(run.x[1], 0.0);
     // The friction balances the spring, u + r = 0.
-    EXPECT_NEAR(run.state.reaction[0], -0.2, 1e-10);
+    EXPECT_NEAR(run.reaction[0], -0.2, 1e-10);
 }
 
 TEST(HandOver, StickSlipStartsAtTheOnsetOfSlipAndRepeats)
@@ -267,8 +267,8 @@ TEST(HandOver, BallSlidesRollsAndRestsOnThePlate)
     EXPECT_EQ(run.events[1].kind, EventKind::stick);
     EXPECT_EQ(run.events[1].guard, 1u);
     EXPECT_NEAR(run.events[1].t, ball.rest_time(faster), 1e-12);
-    EXPECT_NEAR(run.state.w[0], plate, 1e-15);
-    EXPECT_EQ(run.state.w[1], 0.0);
+    EXPECT_NEAR(run.x[0], plate, 1e-15);
+    EXPECT_EQ(run.x[1], 0.0);
 }
 
 TEST(HandOver, BallIsShakenOffItsRest)
@@ -288,7 +288,7 @@ TEST(HandOver, BallIsShakenOffItsRest)
     const double t0 = std::asin(limit / 0.5);
     const double v =
         0.5 * std::cos(t0) + (0.4 * 0.5 * (std::cos(1) - std::cos(t0)) - limit * (1 - t0)) / 1.4;
-    EXPECT_NEAR(run.state.w[0], v, 1e-8);
+    EXPECT_NEAR(run.x[0], v, 1e-8);
 }
 
 /// Two relays on one force: if both release together, the rates do not determine what follows.
@@ -314,9 +314,9 @@ TEST(HandOver, ChangesThatCoincideGoThroughStepsAndBack)
     EXPECT_EQ(run.phases.back().cause, PhaseCause::released);
     EXPECT_FALSE(run.phases.back().set_valued);
     // The steps between have lengths of 3e-3, and there are few of them.
-    EXPECT_LE(run.statistics.set_valued.accepted, 20u);
-    for (int i = 0; i < 2; ++i) EXPECT_NEAR(run.state.w[i], 2, 1e-4);
-    EXPECT_EQ(run.state.reaction[0], -1.0);
+    EXPECT_LE(run.set_valued.accepted, 20u);
+    for (int i = 0; i < 2; ++i) EXPECT_NEAR(run.x[i], 2, 1e-4);
+    EXPECT_EQ(run.reaction[0], -1.0);
 }
 
 // --- accumulation, no modes ---
@@ -330,9 +330,9 @@ TEST(HandOver, TwistingAccumulatesAndIsHeldBySteps)
     ASSERT_EQ(run.phases.size(), 2u);
     EXPECT_EQ(run.phases[1].cause, PhaseCause::accumulation);
     // Held at zero, the relay balances the rate of the disturbance, cos t.
-    EXPECT_LE(run.state.w.norm(), 1e-9);
-    EXPECT_NEAR(run.state.reaction[0], -std::cos(10.0), 1e-6);
-    EXPECT_NEAR(run.statistics.set_valued_time, 10 - run.phases[1].from, 1e-9);
+    EXPECT_LE(run.x.norm(), 1e-9);
+    EXPECT_NEAR(run.reaction[0], -std::cos(10.0), 1e-6);
+    EXPECT_TRUE(run.phases[1].set_valued);
 }
 
 TEST(HandOver, ABallOfReactionsIsFollowedBySteps)
@@ -347,8 +347,8 @@ TEST(HandOver, ABallOfReactionsIsFollowedBySteps)
     // Straight down the slope it stops after v^2 / (2 a); the step across the stop is of
     // order one, 2e-3 s of 1 m/s.
     const double deceleration = p.gravity * (p.friction * std::cos(p.slope) - std::sin(p.slope));
-    EXPECT_NEAR(run.state.w[2], 1 / (2 * deceleration), 1e-4);
-    EXPECT_NEAR(run.state.w[0], 0, 1e-12);
+    EXPECT_NEAR(run.x[2], 1 / (2 * deceleration), 1e-4);
+    EXPECT_NEAR(run.x[0], 0, 1e-12);
 }
 
 // --- the reaction is part of the state ---
@@ -364,14 +364,14 @@ TEST(HandOver, GoesOnFromASavedStateWithItsReaction)
     };
     const auto whole = hand_over(system, start, options(0, 1));
     const auto half = hand_over(system, start, options(0, 0.25));
-    const auto rest = HandOver<InclineBlock>(system, half.state, options(0.25, 1)).take();
+    const auto rest = HandOver<InclineBlock>(system, half, options(0.25, 1)).take();
 
-    EXPECT_NE(half.state.reaction.norm(), 0.0);
-    EXPECT_EQ(rest.state.w, whole.state.w);
-    EXPECT_EQ(rest.state.reaction, whole.state.reaction);
+    EXPECT_NE(half.reaction[0], 0.0);
+    EXPECT_EQ(rest.x, whole.x);
+    EXPECT_EQ(rest.reaction, whole.reaction);
 
-    auto wrong = half.state;
-    wrong.reaction *= 2;
+    auto wrong = half;
+    for (double& r : wrong.reaction) r *= 2;
     EXPECT_THROW(HandOver<InclineBlock>(system, wrong, options(0.25, 1)), std::invalid_argument);
 }
 
@@ -382,11 +382,11 @@ TEST(HandOver, EventDrivenRunsGoOnFromTheirEnd)
     // 1.5 s: held at zero.
     const HandOverOptions first{.t_end = 1.5, .rtol = 1e-12, .atol = 1e-12};
     const auto half = hand_over(DiodeCircuit{}, DiodeCircuit::start(), first);
-    ASSERT_EQ(half.state.w[0], 0.0);
+    ASSERT_EQ(half.x[0], 0.0);
     const HandOverOptions second{.t_end = 20, .rtol = 1e-12, .atol = 1e-12};
-    const auto rest = HandOver<DiodeCircuit>(DiodeCircuit{}, half.state, second).take();
+    const auto rest = HandOver<DiodeCircuit>(DiodeCircuit{}, half, second).take();
     EXPECT_EQ(half.events.size() + rest.events.size(), 12u);
-    EXPECT_LE((rest.state.w - exact.final).norm(), 1e-10);
+    EXPECT_LE((rest.x - exact.final).norm(), 1e-10);
 }
 
 // --- infinite bounds, sets that become empty ---
@@ -416,8 +416,8 @@ TEST(HandOver, AHalfLineHoldsToTheEnd)
     ASSERT_EQ(run.events.size(), 1u);
     EXPECT_EQ(run.events[0].kind, EventKind::stick);
     EXPECT_NEAR(run.events[0].t, 1, 1e-12);
-    EXPECT_EQ(run.state.w[0], 0);
-    EXPECT_NEAR(run.state.reaction[0], 1, 1e-15);
+    EXPECT_EQ(run.x[0], 0);
+    EXPECT_NEAR(run.reaction[0], 1, 1e-15);
     EXPECT_EQ(run.phases.size(), 1u);
 }
 
@@ -427,8 +427,8 @@ TEST(HandOver, AReactionWithoutBoundsHoldsInOnePhase)
     const auto system = pushed(-5, [=](double) { return IntervalSet::symmetric(infinity); });
     const auto run = hand_over(system, one(0), {.t_end = 3});
     ASSERT_EQ(run.outcome, Outcome::reached_end);
-    EXPECT_EQ(run.state.w[0], 0);
-    EXPECT_NEAR(run.state.reaction[0], 5, 1e-14);
+    EXPECT_EQ(run.x[0], 0);
+    EXPECT_NEAR(run.reaction[0], 5, 1e-14);
     EXPECT_EQ(run.phases.size(), 1u);
 }
 
@@ -438,7 +438,7 @@ void expect_empty_at_one_half(double start, const Set& set)
     const auto run = hand_over(pushed(0.1, set), one(start), {.t_end = 1});
     EXPECT_EQ(run.outcome, Outcome::not_converged);
     // Steps of 1e-3 end within one of the time, events where the set changes.
-    EXPECT_NEAR(run.state.t, 0.5, 2e-3);
+    EXPECT_NEAR(run.t, 0.5, 2e-3);
     EXPECT_EQ(run.failure.set, 0);
 }
 
@@ -453,7 +453,7 @@ TEST(HandOver, ASetThatBecomesEmptyEndsTheRun)
         pushed(0.1, [](double t) { return IntervalSet::symmetric(t < 0.5 ? 1 : std::nan("")); }),
         one(5), {.t_end = 1});
     EXPECT_EQ(run.outcome, Outcome::non_finite);
-    EXPECT_LE(run.state.t, 0.5);
+    EXPECT_LE(run.t, 0.5);
 }
 
 /// Two relays; the set of the second becomes empty at t = 0.5.
@@ -469,9 +469,9 @@ TEST(HandOver, NamesTheReactionWhoseSetIsEmpty)
 {
     const auto run = hand_over(SecondVanishes{}, Eigen::Vector2d(3, 3), {.t_end = 1});
     EXPECT_EQ(run.outcome, Outcome::not_converged);
-    EXPECT_NEAR(run.state.t, 0.5, 1e-9);
+    EXPECT_NEAR(run.t, 0.5, 1e-9);
     EXPECT_EQ(run.failure.set, 1);
-    EXPECT_NEAR(run.state.w[0], 2.5, 1e-8);
+    EXPECT_NEAR(run.x[0], 2.5, 1e-8);
 }
 
 // --- chattering ---
@@ -497,8 +497,8 @@ TEST(HandOver, ChatteringIsSteppedOver)
     // A thousand steps of 1e-3, and a few hundred switches before each set-valued phase; the
     // patience of these phases doubles, so that a run of a thousand steps has few.
     EXPECT_LE(run.phases.size(), 16u);
-    EXPECT_LE(run.statistics.set_valued.attempted, 1100u);
-    EXPECT_LE(run.state.w.norm(), 1e-7);
+    EXPECT_LE(run.set_valued.attempted, 1100u);
+    EXPECT_LE(run.x.norm(), 1e-7);
 }
 
 TEST(HandOver, StepsOfBothKindsCountTowardsTheLimit)
@@ -506,7 +506,7 @@ TEST(HandOver, StepsOfBothKindsCountTowardsTheLimit)
     const auto run = hand_over(RelayTwoIntegrationsAway{}, Eigen::Vector2d(0, 1e-8),
                                {.t_end = 1, .max_steps = 700});
     EXPECT_EQ(run.outcome, Outcome::step_limit);
-    EXPECT_LE(run.statistics.event_driven.steps + run.statistics.set_valued.attempted, 700u);
+    EXPECT_LE(run.statistics.steps - run.set_valued.accepted + run.set_valued.attempted, 700u);
     EXPECT_EQ(hand_over(SlidingMode{}, one(0.15), {.t_end = 1, .max_steps = 0}).outcome,
               Outcome::step_limit);
 }
@@ -543,7 +543,7 @@ TEST(HandOver, EveryExitFromRestIsFound)
         EXPECT_EQ(run.events[2 * i + 1].kind, EventKind::stick);
     }
     // About ten steps for each change; a step that is repeated counts.
-    EXPECT_LE(run.statistics.event_driven.steps, 5000u);
+    EXPECT_LE(run.statistics.steps, 5000u);
 }
 
 TEST(HandOver, TwoSinesAsALoadMoveARelayFromRest)
@@ -555,7 +555,7 @@ TEST(HandOver, TwoSinesAsALoadMoveARelayFromRest)
         const auto fine = hand_over(system, one(0), {.t_end = 20, .h_max = 0.02});
         ASSERT_EQ(run.outcome, Outcome::reached_end);
         EXPECT_EQ(run.events.size(), fine.events.size()) << i;
-        EXPECT_NEAR(run.state.w[0], fine.state.w[0], 1e-8) << i;
+        EXPECT_NEAR(run.x[0], fine.x[0], 1e-8) << i;
         for (const auto& event : run.events) EXPECT_NE(event.mode_before, event.mode_after) << i;
     }
 }
@@ -567,8 +567,8 @@ TEST(HandOver, ALoadOfTheSizeOfTheBoundIsHeldInLongSteps)
         const auto system = pushed(load, [](double) { return IntervalSet::symmetric(1); });
         const auto run = hand_over(system, one(0), {.t_end = 100});
         ASSERT_EQ(run.outcome, Outcome::reached_end);
-        EXPECT_EQ(run.state.w[0], 0);
-        EXPECT_LE(run.statistics.event_driven.steps, 50u);
+        EXPECT_EQ(run.x[0], 0);
+        EXPECT_LE(run.statistics.steps, 50u);
     }
 }
 
@@ -578,7 +578,7 @@ TEST(HandOver, EndsAtOnceWhereItStarts)
 {
     const auto run = hand_over(SlidingMode{}, one(0.15), {.t_end = 0});
     EXPECT_EQ(run.outcome, Outcome::reached_end);
-    EXPECT_EQ(run.state.w[0], 0.15);
+    EXPECT_EQ(run.x[0], 0.15);
 }
 
 TEST(HandOver, ReportsLimitsAndCancelling)
@@ -586,7 +586,7 @@ TEST(HandOver, ReportsLimitsAndCancelling)
     const auto few =
         hand_over(DiodeCircuit{}, DiodeCircuit::start(), {.t_end = 20, .max_steps = 5});
     EXPECT_EQ(few.outcome, Outcome::step_limit);
-    EXPECT_LT(few.state.t, 20);
+    EXPECT_LT(few.t, 20);
     const std::atomic<bool> stop{true};
     const auto none =
         hand_over(InclineBlock{}, Eigen::Vector4d(1, 0, 0, 0), {.t_end = 2, .cancelled = &stop});

@@ -89,7 +89,7 @@ TEST(PaddedInclusions, ResultsHaveTheComponentsOfTheSystem)
 {
     const auto run =
         hand_over(Five{}, Five::start(), {.t_end = 10, .rtol = 1e-8, .sample_times = {1, 2}});
-    static_assert(std::is_same_v<std::remove_cvref_t<decltype(run.state.w)>, Five::Vector>);
+    static_assert(std::is_same_v<std::remove_cvref_t<decltype(run.x)>, Five::Vector>);
     static_assert(std::is_same_v<std::remove_cvref_t<decltype(run.events[0].after)>, Five::Vector>);
     EXPECT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_GT(run.events.size(), 3U);
@@ -101,10 +101,10 @@ TEST(PaddedInclusions, ARunContinuesFromItsState)
 {
     const auto first = hand_over(Five{}, Five::start(), {.t_end = 5, .rtol = 1e-8});
     const auto whole = hand_over(Five{}, Five::start(), {.t_end = 10, .rtol = 1e-8});
-    const auto rest = HandOver<Five>(Five{}, first.state, {.t_end = 10, .rtol = 1e-8}).take();
+    const auto rest = HandOver<Five>(Five{}, first, {.t_end = 10, .rtol = 1e-8}).take();
     EXPECT_EQ(rest.outcome, Outcome::reached_end);
     // Two runs with other steps, each within 1e-8 of its size at every step, over a damped motion.
-    EXPECT_LT((rest.state.w - whole.state.w).norm(), 1e-5);
+    EXPECT_LT((rest.x - whole.x).norm(), 1e-5);
 }
 
 TEST(PaddedInclusions, MotionsHaveTheStatesOfTheSystem)

@@ -478,7 +478,7 @@ TEST(PhasesBySteps, ADiscAtRestBreaksNoLawWhateverMovesBesideIt)
                                        Eigen::Vector3d(0.6 * speed, 0.8 * speed, 0), {.t_end = 9});
             EXPECT_EQ(run.outcome, Outcome::reached_end) << rate << " " << speed;
             // It stops after `speed` seconds, and rests up to the solver's 1e-10.
-            EXPECT_LT(run.state.w.head<2>().norm(), 1e-9);
+            EXPECT_LT(run.x.head<2>().norm(), 1e-9);
         }
     }
 }

@@ -62,11 +62,11 @@ TEST(PhasesEnds, SeveralMotionsEndARunOfTheInclusionAloneToo)
     const Repulsive::Motion motion{0};
     const auto run = hand_over(motion, Repulsive::Motion::Vector::Zero(), {.t_end = 1});
     EXPECT_EQ(run.outcome, Outcome::several);
-    EXPECT_EQ(run.state.t, 0);
+    EXPECT_EQ(run.t, 0);
     const auto passed =
         hand_over(Repulsive::Motion{3}, Repulsive::Motion::Vector::Zero(), {.t_end = 1});
     EXPECT_EQ(passed.outcome, Outcome::reached_end);
-    EXPECT_NEAR(passed.state.w[0], 4, exact_motion);
+    EXPECT_NEAR(passed.x[0], 4, exact_motion);
 }
 
 // --- sets that are faulty at the start, where the system's own flow is followed ---

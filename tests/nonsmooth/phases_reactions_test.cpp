@@ -134,8 +134,7 @@ void expect_reactions(const System& system, const StateOf<System>& w0, std::vect
     ASSERT_EQ(run.reactions.size(), expected.size());
     for (std::size_t k = 0; k < expected.size(); ++k) {
         SCOPED_TRACE(run.trajectory.t[k]);
-        const auto& r = run.reactions[k];
-        expect_row(Row(r.data(), r.data() + r.size()), expected[k]);
+        expect_row(run.reactions[k], expected[k]);
     }
 }
 

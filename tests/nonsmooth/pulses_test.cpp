@@ -30,8 +30,8 @@ TEST(Pulses, ADiodeBehindAChopperTakesFewStepsThoughItsHeldPhaseEndsSharply)
 {
     const auto run = hand_over(Chopper{}, Chopper::W{0}, {.t_end = 1.2});
     ASSERT_EQ(run.outcome, Outcome::reached_end);
-    EXPECT_NEAR(run.state.w[0], 0.2, 1e-8);
-    EXPECT_LE(run.statistics.event_driven.steps, 300u);
+    EXPECT_NEAR(run.x[0], 0.2, 1e-8);
+    EXPECT_LE(run.statistics.steps, 300u);
 }
 
 /// 1 kg with friction 1 N: the load 0.5 N, from t = 1 on 1.5 N.
@@ -48,8 +48,8 @@ TEST(Pulses, ABlockThatAStepOfItsLoadReleasesTakesFewSteps)
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 1u);
     EXPECT_NEAR(run.events[0].t, 1, 1e-8);
-    EXPECT_NEAR(run.state.w[0], 1, 1e-8);
-    EXPECT_LE(run.statistics.event_driven.steps, 300u);
+    EXPECT_NEAR(run.x[0], 1, 1e-8);
+    EXPECT_LE(run.statistics.steps, 300u);
 }
 
 /// A ready inclusion with a load of `size` on one component between two times.
@@ -86,11 +86,11 @@ void expect_few_steps(const Pulsed<System>& pulsed, const typename System::Vecto
         part.to = t_end + 2;
         const auto run = hand_over(part, w, {.t_start = from, .t_end = to});
         ASSERT_EQ(run.outcome, Outcome::reached_end);
-        steps += run.statistics.event_driven.steps;
-        w = run.state.w;
+        steps += run.statistics.steps;
+        w = run.x;
     }
-    EXPECT_LE(whole.statistics.event_driven.steps, 2 * steps + 300);
-    EXPECT_LE((whole.state.w - w).cwiseAbs().maxCoeff(), 1e-7);
+    EXPECT_LE(whole.statistics.steps, 2 * steps + 300);
+    EXPECT_LE((whole.x - w).cwiseAbs().maxCoeff(), 1e-7);
 }
 
 TEST(Pulses, EveryReadyInclusionGoesOnWithLongStepsAfterAPulseThatReleasesIt)

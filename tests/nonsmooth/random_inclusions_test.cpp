@@ -18,8 +18,8 @@ constexpr int samples = 8;
 
 /// One instantiation for all families.
 template <int M>
-[[gnu::noinline]] HandOverRun<RandomInclusion<M>> run_of(const RandomInclusion<M>& system,
-                                                         double divisions)
+[[gnu::noinline]] Run<StateOf<RandomInclusion<M>>> run_of(const RandomInclusion<M>& system,
+                                                          double divisions)
 {
     HandOverOptions options{.t_end = system.t_end, .max_steps = 100'000};
     options.sample_times = test::equal_times(system.t_end, samples);

@@ -66,15 +66,15 @@ void expect_motion_of_inclusion(const State& x, double t, const RandomInclusion<
     const auto alone = hand_over(inclusion, inclusion.start, options);
     ASSERT_EQ(alone.outcome, Outcome::reached_end);
     Eigen::Matrix<double, 6, 1> rate;
-    inclusion.smooth(t, alone.state.w, rate);
-    rate += inclusion.lever * alone.state.reaction;
+    inclusion.smooth(t, alone.x, rate);
+    rate += inclusion.lever * Eigen::Map<const Eigen::Matrix<double, M, 1>>(alone.reaction.data());
     rate[4] = 0;
     const double h = inclusion.t_end / 1000;
-    const double allowed = std::max({of_motion * alone.state.w.cwiseAbs().maxCoeff(),
-                                     2 * h * rate.cwiseAbs().maxCoeff(), of_motion});
+    const double allowed = std::max(
+        {of_motion * alone.x.cwiseAbs().maxCoeff(), 2 * h * rate.cwiseAbs().maxCoeff(), of_motion});
     for (std::size_t i = 0; i < x.size(); ++i) {
         if (i == 4) continue;
-        EXPECT_NEAR(x[i], alone.state.w[static_cast<Eigen::Index>(i)], allowed) << i;
+        EXPECT_NEAR(x[i], alone.x[static_cast<Eigen::Index>(i)], allowed) << i;
     }
 }
 

@@ -35,7 +35,7 @@ struct Block {
     [[nodiscard]] double static_bound(double, const W&, int) const { return at_rest; }
 };
 
-HandOverRun<Block> slide(const Block& block, double w0, double t_end)
+Run<StateOf<Block>> slide(const Block& block, double w0, double t_end)
 {
     return hand_over(block, Block::W{w0}, {.t_end = t_end});
 }
@@ -47,10 +47,10 @@ TEST(StaticFriction, ABlockSlipsWhereItsLoadPassesTheStaticBound)
     ASSERT_EQ(run.events.size(), 1u);
     EXPECT_EQ(run.events[0].kind, EventKind::slip);
     EXPECT_NEAR(run.events[0].t, 5, 1e-12);
-    EXPECT_NEAR(run.state.w[0], 0.6, 1e-10);
-    EXPECT_NEAR(run.state.reaction[0], -0.5, 1e-15);
+    EXPECT_NEAR(run.x[0], 0.6, 1e-10);
+    EXPECT_NEAR(run.reaction[0], -0.5, 1e-15);
     const auto back = slide({.load = [](double t) { return -t / 5; }}, 0, 6);
-    EXPECT_NEAR(back.state.w[0], -0.6, 1e-10);
+    EXPECT_NEAR(back.x[0], -0.6, 1e-10);
 }
 
 TEST(StaticFriction, ALoadThatRestsAtTheStaticBoundMovesNothing)
@@ -58,16 +58,16 @@ TEST(StaticFriction, ALoadThatRestsAtTheStaticBoundMovesNothing)
     const auto equal = slide({.load = [](double t) { return std::min(t, 1.0); }}, 0, 2);
     EXPECT_EQ(equal.outcome, Outcome::reached_end);
     EXPECT_EQ(equal.events.size(), 0u);
-    EXPECT_EQ(equal.state.w[0], 0);
+    EXPECT_EQ(equal.x[0], 0);
     const auto more = slide({.load = [](double t) { return std::min(t, 1 + 1e-6); }}, 0, 2);
     ASSERT_EQ(more.events.size(), 1u);
     EXPECT_NEAR(more.events[0].t, 1, 1e-12);
-    EXPECT_NEAR(more.state.w[0], 0.500001, 1e-9);
+    EXPECT_NEAR(more.x[0], 0.500001, 1e-9);
     const auto constant = slide({.load = [](double) { return 1.0; }}, 0, 2);
-    EXPECT_EQ(constant.state.w[0], 0);
+    EXPECT_EQ(constant.x[0], 0);
     EXPECT_EQ(constant.events.size(), 0u);
     const auto touches = slide({.load = [](double t) { return 2 * t - t * t; }}, 0, 2);
-    EXPECT_EQ(touches.state.w[0], 0);
+    EXPECT_EQ(touches.x[0], 0);
     EXPECT_EQ(touches.events.size(), 0u);
 }
 
@@ -77,12 +77,12 @@ TEST(StaticFriction, ABlockThatStopsIsHeldThoughTheKineticLawWouldLetItTurn)
     ASSERT_EQ(run.events.size(), 1u);
     EXPECT_EQ(run.events[0].kind, EventKind::stick);
     EXPECT_NEAR(run.events[0].t, 1, 1e-12);
-    EXPECT_EQ(run.state.w[0], 0);
-    EXPECT_NEAR(run.state.reaction[0], 0.7, 1e-15);
+    EXPECT_EQ(run.x[0], 0);
+    EXPECT_NEAR(run.reaction[0], 0.7, 1e-15);
     const auto turns = slide({.load = [](double) { return -1.1; }}, 1.6, 3);
     ASSERT_EQ(turns.events.size(), 1u);
     EXPECT_EQ(turns.events[0].kind, EventKind::mode);
-    EXPECT_NEAR(turns.state.w[0], -0.6 * 2, 1e-10);
+    EXPECT_NEAR(turns.x[0], -0.6 * 2, 1e-10);
 }
 
 // Stick and slip on a belt, whose period has a closed form.
@@ -133,7 +133,7 @@ struct Joints {
     void act(Eigen::Matrix2d& g) const { g << 1, -1, -1, 2; }
 };
 
-void expect_slips(const HandOverRun<Joints>& run, double first, double second)
+void expect_slips(const Run<StateOf<Joints>>& run, double first, double second)
 {
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 2u);
@@ -148,16 +148,16 @@ TEST(StaticFriction, AReactionThatFallsToItsKineticBoundMayReleaseAnother)
 {
     const auto both = hand_over(Joints{}, Joints::W(0, 0), {.t_end = 2});
     expect_slips(both, 1, 1);
-    EXPECT_NEAR(both.state.w[0], 1.3, 1e-10);
-    EXPECT_NEAR(both.state.w[1], -1.6, 1e-10);
+    EXPECT_NEAR(both.x[0], 1.3, 1e-10);
+    EXPECT_NEAR(both.x[1], -1.6, 1e-10);
     const auto later = hand_over(Joints{.second = -0.7}, Joints::W(0, 0), {.t_end = 2});
     expect_slips(later, 1, 1.1);
-    EXPECT_NEAR(later.state.w[0], 1.1525, 1e-10);
-    EXPECT_NEAR(later.state.w[1], -1.305, 1e-10);
+    EXPECT_NEAR(later.x[0], 1.1525, 1e-10);
+    EXPECT_NEAR(later.x[1], -1.305, 1e-10);
     const auto equal = hand_over(Joints{.kinetic = 1}, Joints::W(0, 0), {.t_end = 2});
     expect_slips(equal, 1, 1.4);
-    EXPECT_NEAR(equal.state.w[0], 0.34, 1e-10);
-    EXPECT_NEAR(equal.state.w[1], -0.18, 1e-10);
+    EXPECT_NEAR(equal.x[0], 0.34, 1e-10);
+    EXPECT_NEAR(equal.x[1], -0.18, 1e-10);
 }
 
 // --- beside events ---
@@ -344,12 +344,12 @@ TEST(StaticFriction, ADiscSlipsWhereItsLoadPassesTheStaticBound)
     const Disc disc{.load = [](double t) { return Disc::W(Disc::W(0.6, 0.8) * t / 5); }};
     const auto run = hand_over(disc, Disc::W{0, 0}, {.t_end = 6});
     ASSERT_EQ(run.outcome, Outcome::reached_end);
-    EXPECT_NEAR(run.state.w[0], 0.36, of_steps);
-    EXPECT_NEAR(run.state.w[1], 0.48, of_steps);
-    EXPECT_NEAR(run.state.reaction.norm(), 0.5, of_steps);
+    EXPECT_NEAR(run.x[0], 0.36, of_steps);
+    EXPECT_NEAR(run.x[1], 0.48, of_steps);
+    EXPECT_NEAR(std::hypot(run.reaction[0], run.reaction[1]), 0.5, of_steps);
     const auto held = hand_over(disc, Disc::W{0, 0}, {.t_end = 5 - 1e-9});
-    EXPECT_EQ(held.state.w, Disc::W(0, 0));
-    EXPECT_NEAR(held.state.reaction.norm(), 1, 1e-9);
+    EXPECT_EQ(held.x, Disc::W(0, 0));
+    EXPECT_NEAR(std::hypot(held.reaction[0], held.reaction[1]), 1, 1e-9);
 }
 
 TEST(StaticFriction, ADiscLeavesAlongTheDirectionThatItsKineticLawHasThere)
@@ -361,7 +361,7 @@ TEST(StaticFriction, ADiscLeavesAlongTheDirectionThatItsKineticLawHasThere)
     const double h = 1e-5;
     const auto run = hand_over(disc, Disc::W{0, 0}, {.t_end = 1 + h});
     ASSERT_EQ(run.outcome, Outcome::reached_end);
-    const Disc::W rate = run.state.w / h;
+    const Disc::W rate = run.x / h;
     EXPECT_NEAR(rate.norm(), 0.228073260292, h);
     EXPECT_NEAR(rate[0] / rate.norm(), 0.824092893837, h);
     EXPECT_NEAR(rate[1] / rate.norm(), 0.566454678087, h);
@@ -374,12 +374,12 @@ TEST(StaticFriction, ADiscIsHeldWhereItStopsUnderALoadBetweenItsBounds)
     const Disc disc{.load = [](double) { return Disc::W(Disc::W(0.6, 0.8) * 0.7); }};
     const auto run = hand_over(disc, Disc::W{-0.72, -0.96}, {.t_end = 3});
     ASSERT_EQ(run.outcome, Outcome::reached_end);
-    EXPECT_LT(run.state.w.norm(), 1e-12);
-    EXPECT_NEAR(run.state.reaction.norm(), 0.7, 1e-12);
+    EXPECT_LT(run.x.norm(), 1e-12);
+    EXPECT_NEAR(std::hypot(run.reaction[0], run.reaction[1]), 0.7, 1e-12);
     // Above the static bound it turns: v' = 1.1 - 0.5 after the stop at 1 from 1.6.
     const Disc pulled{.load = [](double) { return Disc::W(Disc::W(0.6, 0.8) * 1.1); }};
     const auto turned = hand_over(pulled, Disc::W{-0.96, -1.28}, {.t_end = 2});
-    EXPECT_NEAR(turned.state.w.norm(), 0.6, of_steps);
+    EXPECT_NEAR(turned.x.norm(), 0.6, of_steps);
 }
 
 TEST(StaticFriction, ADiscStopsUnderASmallLoadAndSlipsAgain)
@@ -389,16 +389,16 @@ TEST(StaticFriction, ADiscStopsUnderASmallLoadAndSlipsAgain)
     const Disc disc{.load = [](double t) { return Disc::W(Disc::W(0.8, -0.6) * (t - 3) / 2); }};
     const auto run = hand_over(disc, Disc::W(0.8, -0.6), {.t_end = 6});
     ASSERT_EQ(run.outcome, Outcome::reached_end);
-    EXPECT_NEAR(run.state.w[0], 0.8 * 0.75, of_steps);
-    EXPECT_NEAR(run.state.w[1], -0.6 * 0.75, of_steps);
+    EXPECT_NEAR(run.x[0], 0.8 * 0.75, of_steps);
+    EXPECT_NEAR(run.x[1], -0.6 * 0.75, of_steps);
 }
 
 TEST(StaticFriction, ALoadThatRestsAtTheStaticBoundOfADiscMovesNothing)
 {
     const Disc disc{.load = [](double t) { return Disc::W(0, std::min(t, 1.0)); }};
-    EXPECT_EQ(hand_over(disc, Disc::W{0, 0}, {.t_end = 2}).state.w, Disc::W(0, 0));
+    EXPECT_EQ(hand_over(disc, Disc::W{0, 0}, {.t_end = 2}).x, Disc::W(0, 0));
     const Disc above{.load = [](double t) { return Disc::W(0, std::min(t, 1 + 1e-6)); }};
-    EXPECT_NEAR(hand_over(above, Disc::W{0, 0}, {.t_end = 2}).state.w[1], 0.500001, 1e-6);
+    EXPECT_NEAR(hand_over(above, Disc::W{0, 0}, {.t_end = 2}).x[1], 0.500001, 1e-6);
 }
 
 /// The same body as a phase of a run beside a ball that falls on an elastic floor at g = 1; a tick
@@ -467,9 +467,9 @@ TEST(StaticFriction, DiscsAreHeldEachByItself)
     // The first slips at 1, and moves by (t - 1/2)^2 / 2 after it; the second at 5.
     const auto run = hand_over(TwoDiscs{}, TwoDiscs::W::Zero(), {.t_end = 6});
     ASSERT_EQ(run.outcome, Outcome::reached_end);
-    EXPECT_NEAR(run.state.w[0], (5.5 * 5.5 - 0.5 * 0.5) / 2, of_steps);
-    EXPECT_NEAR(run.state.w[2], 0.2 * (36 - 25) - 0.5, of_steps);
-    EXPECT_EQ(run.state.w[1], 0);
+    EXPECT_NEAR(run.x[0], (5.5 * 5.5 - 0.5 * 0.5) / 2, of_steps);
+    EXPECT_NEAR(run.x[2], 0.2 * (36 - 25) - 0.5, of_steps);
+    EXPECT_EQ(run.x[1], 0);
 }
 
 TEST(StaticFriction, AStaticBoundOfADiscBelowItsKineticOneIsRefused)

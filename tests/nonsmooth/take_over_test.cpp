@@ -90,7 +90,7 @@ TEST(TakeOver, StickSlipIsGivenBackAtEverySlip)
         return phase.cause == PhaseCause::released;
     };
     EXPECT_GE(std::count_if(run.phases.begin(), run.phases.end(), released), 3);
-    EXPECT_NEAR(run.x[0], alone.state.w[0], 1e-6);
+    EXPECT_NEAR(run.x[0], alone.x[0], 1e-6);
 }
 
 TEST(TakeOver, StepsOfAllPhasesCountTowardsTheLimit)
@@ -228,8 +228,8 @@ void expect_few_crossings(const LoadedBelt& belt, const LoadedBelt::State& x0, d
     EXPECT_LE(run.events.size(), 401 * run.phases.size());
     const auto alone = hand_over(belt.inclusion, Eigen::Vector2d(x0[0], x0[1]), {.t_end = t_end});
     // A crossing within a step adds up to the error of a step, at each of some hundred.
-    EXPECT_NEAR(run.x[0], alone.state.w[0], 1e4 * tolerance);
-    EXPECT_NEAR(run.x[1], alone.state.w[1], 1e4 * tolerance);
+    EXPECT_NEAR(run.x[0], alone.x[0], 1e4 * tolerance);
+    EXPECT_NEAR(run.x[1], alone.x[1], 1e4 * tolerance);
 }
 
 TEST(TakeOver, SwitchingWithinTheErrorOfStepsIsHandedOver)

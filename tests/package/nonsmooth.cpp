@@ -11,7 +11,7 @@ int main()
     const SlidingMode relay({.amplitude = 1.75, .frequency = 50, .gain = 2});
     const SlidingMode::Vector start = SlidingMode::Vector::Constant(SlidingMode::start);
     const auto run = ricochet::integrate(relay, start, {.t_end = SlidingMode::t_end});
-    const bool held = std::abs(run.state.w[0]) < 1e-9;
+    const bool held = std::abs(run.x[0]) < 1e-9;
     std::puts(held ? "fine" : "not held");
     return held ? 0 : 1;
 }

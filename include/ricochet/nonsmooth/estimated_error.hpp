@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <type_traits>
 #include <vector>
 
 #include "ricochet/run.hpp"
@@ -21,21 +20,13 @@ namespace ricochet {
 /// steps: the error of a method of order 1, and up to one and a half times that of order 2.
 /// Infinite where a run ends for another reason or is cut short, and at sample times that it does
 /// not reach.
-template <class Vector>
+template <class State>
 struct EstimatedError {
-    Vector end;                   ///< of the state at the end
-    std::vector<Vector> samples;  ///< of the states at the sample times
+    State end;                   ///< of the state at the end
+    std::vector<State> samples;  ///< of the states at the sample times
 };
 
 namespace detail {
-
-/// What a run leaves to be compared.
-template <class Vector>
-struct ComparedRun {
-    Outcome outcome;
-    const Vector& end;
-    const std::vector<Vector>& samples;
-};
 
 /// Raises an error to the difference from another state, or to infinity where there is none.
 template <class Vector>
@@ -49,29 +40,26 @@ void raise(Vector& error, const Vector& x, const Vector* other, double factor)
     }
 }
 
-/// @param repeat    runs with a part of the steps
-/// @param compared  `ComparedRun` of a run
-template <class Run, class Repeat, class Compared>
-[[nodiscard]] auto estimated_error(const Run& run, const Repeat& repeat, const Compared& compared)
+/// @param repeat  runs with a part of the steps
+template <class X, class Repeat>
+[[nodiscard]] EstimatedError<X> estimated_error(const Run<X>& whole, const Repeat& repeat)
 {
-    const auto whole = compared(run);
-    const auto zero = [](auto x) {
+    const auto zero = [](X x) {
         for (auto& component : x) component = 0;
         return x;
     };
-    EstimatedError<std::decay_t<decltype(whole.end)>> out{zero(whole.end), {}};
-    for (const auto& x : whole.samples) out.samples.push_back(zero(x));
+    EstimatedError<X> out{zero(whole.x), {}};
+    for (const X& x : whole.trajectory.x) out.samples.push_back(zero(x));
     const bool is_cut = whole.outcome == Outcome::step_limit ||
                         whole.outcome == Outcome::cancelled || whole.outcome == Outcome::stalled;
     for (const double part : {0.5, 0.37}) {
-        const Run again = repeat(part);
-        const auto other = compared(again);
+        const Run<X> other = repeat(part);
         const double factor = 1 / (1 - part);
         const bool ends_alike = whole.outcome == other.outcome && !is_cut;
-        raise(out.end, whole.end, ends_alike ? &other.end : nullptr, factor);
-        for (std::size_t k = 0; k < whole.samples.size(); ++k) {
-            const bool reaches = k < other.samples.size();
-            raise(out.samples[k], whole.samples[k], reaches ? &other.samples[k] : nullptr, factor);
+        raise(out.end, whole.x, ends_alike ? &other.x : nullptr, factor);
+        const std::vector<X>&samples = whole.trajectory.x, &others = other.trajectory.x;
+        for (std::size_t k = 0; k < samples.size(); ++k) {
+            raise(out.samples[k], samples[k], k < others.size() ? &others[k] : nullptr, factor);
         }
     }
     return out;

@@ -25,6 +25,7 @@
 #include "ricochet/nonsmooth/detail/inclusion_alone.hpp"
 #include "ricochet/nonsmooth/detail/inclusion_sizes.hpp"
 #include "ricochet/nonsmooth/detail/phased_run.hpp"
+#include "ricochet/nonsmooth/estimated_error.hpp"
 #include "ricochet/nonsmooth/hand_over_run.hpp"
 
 namespace ricochet {
@@ -34,7 +35,7 @@ namespace ricochet {
 template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
 class HandOver {
     static_assert(detail::check_inclusion<System>());
-    using Run = detail::RunOfInclusion<System, Stepping>;
+    using Motion = detail::RunOfInclusion<System, Stepping>;
 
 public:
     using Vector = StateOf<System>;
@@ -44,40 +45,61 @@ public:
     /// @throws std::invalid_argument for invalid options, systems and initial
     /// states.
     HandOver(const System& system, const Vector& w0, const HandOverOptions& options)
-        : run_(std::make_shared<Run>(system, w0, options))
+        : run_(std::make_shared<Motion>(system, w0, options))
     {
     }
 
-    /// Starts from the state of an earlier run, with its reaction.
+    /// Starts from the end of an earlier run, with its reaction.
     /// @throws std::invalid_argument also if the reaction lies outside the set.
+    HandOver(const System& system, const Run<Vector>& earlier, const HandOverOptions& options)
+        : HandOver(system, State{earlier.t, earlier.x, reaction_of(earlier)}, options)
+    {
+    }
     HandOver(const System& system, const State& start, const HandOverOptions& options)
-        : run_(std::make_shared<Run>(system, start, options))
+        : run_(std::make_shared<Motion>(system, start, options))
     {
     }
 
     /// Advances to the end and returns the result, whatever the outcome.
-    [[nodiscard]] HandOverRun<System> take() { return run_->take(); }
+    [[nodiscard]] Run<Vector> take() { return run_->take(); }
 
 private:
-    std::shared_ptr<Run> run_;
+    [[nodiscard]] static Reaction reaction_of(const Run<Vector>& earlier)
+    {
+        const std::vector<double>& r = earlier.reaction;
+        const int m = reaction_size<System>;
+        if (r.empty() || (m != Eigen::Dynamic && r.size() != static_cast<std::size_t>(m))) {
+            detail::refuse_inclusion("the start must have as many reactions as the system, not",
+                                     static_cast<double>(r.size()));
+        }
+        return Eigen::Map<const Reaction>(r.data(), static_cast<Eigen::Index>(r.size()));
+    }
+
+    std::shared_ptr<Motion> run_;
 };
 
 /// Runs a whole inclusion in one call.
 template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
-[[nodiscard]] HandOverRun<System> hand_over(const System& system, const StateOf<System>& w0,
-                                            const HandOverOptions& options,
-                                            const Stepping& /*stepping*/ = {})
+[[nodiscard]] Run<StateOf<System>> hand_over(const System& system, const StateOf<System>& w0,
+                                             const HandOverOptions& options,
+                                             const Stepping& /*stepping*/ = {})
 {
-    HandOverRun<System> run = HandOver<System, Stepping>(system, w0, options).take();
-    if (!options.estimate_error) return run;
-    const auto with_part = [&](double part) {
+    return HandOver<System, Stepping>(system, w0, options).take();
+}
+
+/// The error of a run that `hand_over` has returned for the other arguments, from two more runs
+/// with shorter `set_valued.step`: five times the work of that run.
+template <Inclusion System, class Stepping = ErrorControlled<Dopri5>>
+[[nodiscard]] EstimatedError<StateOf<System>> estimate_error(const Run<StateOf<System>>& run,
+                                                             const System& system,
+                                                             const StateOf<System>& w0,
+                                                             const HandOverOptions& options,
+                                                             const Stepping& stepping = {})
+{
+    return detail::estimated_error(run, [&](double part) {
         const auto finer = detail::with_part_of_steps(options, Branching<System>, part);
-        return HandOver<System, Stepping>(system, w0, finer).take();
-    };
-    run.error = detail::estimated_error(run, with_part, [](const HandOverRun<System>& of) {
-        return detail::ComparedRun<StateOf<System>>{of.outcome, of.state.w, of.trajectory.x};
+        return hand_over(system, w0, finer, stepping);
     });
-    return run;
 }
 
 /// Rejects, with a sentence at compile time, a system that is not an inclusion; never called.
@@ -260,8 +282,8 @@ requires Flowing<System, X> && StateVector<X> && KnowsInclusion<System>
 ///         `h_min`, `event_rtol`, `event_window`, `check_inside`.
 template <class System, class X, class Stepping = ErrorControlled<Dopri5>>
 requires NotIntegrable<System, X> && Inclusion<System>
-[[nodiscard]] HandOverRun<System> integrate(const System& system, const X& w0,
-                                            const Options& options, const Stepping& stepping = {})
+[[nodiscard]] Run<StateOf<System>> integrate(const System& system, const X& w0,
+                                             const Options& options, const Stepping& stepping = {})
 {
     auto run = hand_over(system, StateOf<System>(w0), detail::inclusion_options(options), stepping);
     if (!options.record_events) run.events.clear();

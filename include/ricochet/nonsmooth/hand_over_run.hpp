@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "ricochet/guard.hpp"
-#include "ricochet/nonsmooth/estimated_error.hpp"
 #include "ricochet/nonsmooth/set_valued_motion.hpp"
 #include "ricochet/options.hpp"
 #include "ricochet/phase.hpp"
@@ -47,40 +46,13 @@ struct HandOverOptions {
     /// its span; 0: never.
     std::uint64_t stall_steps = 1'000'000;
     const std::atomic<bool>* cancelled = nullptr;
-
-    /// Whether two more runs with a shorter `set_valued.step` tell the error of the run:
-    /// `HandOverRun::error`, `ContactRun::error`. Six times the work; by `hand_over` alone, not by
-    /// a `ContactMotion`.
-    bool estimate_error = false;
 };
 
-/// Work of a hand-over, by the kind of phase.
-struct HandOverStatistics {
-    Statistics event_driven;
-    SetValuedStatistics set_valued;
-    std::uint64_t to_set_valued = 0;  ///< hand-overs, including a start there
-    std::uint64_t to_events = 0;
-    double set_valued_time = 0;  ///< [s] duration of the set-valued motion
-};
-
-/// `Event::guard` is the reaction that changed; modes are those of `BranchModes`.
+/// The result of a hand-over is a `Run` of the inclusion's vectors. `Event::guard` is the reaction
+/// that changed, modes are those of `BranchModes`, and `Run::reaction` belongs to the state, so
+/// that another run goes on from both.
 template <Inclusion System>
-struct RICOCHET_ALIGNED HandOverRun {
-    using Vector = StateOf<System>;
-
-    Outcome outcome = Outcome::reached_end;
-    SetValuedState<System> state;  ///< at the time reached, with its reaction
-    Mode mode = 0;                 ///< `BranchModes::several` in a set-valued phase
-    std::vector<Event<Vector>> events;
-    std::vector<MotionPhase> phases;
-    Trajectory<Vector> trajectory;  ///< at the sample times
-    /// At the sample times, after the events there: of all with the same effect the least.
-    std::vector<ReactionOf<System>> reactions;
-    HandOverStatistics statistics;
-    StageReport failure;  ///< with `not_converged`: the residual, and whose law or set failed
-    /// With `HandOverOptions::estimate_error`.
-    std::optional<EstimatedError<Vector>> error;
-};
+using HandOverRun [[deprecated("Run<StateOf<System>>")]] = Run<StateOf<System>>;
 
 /// Converts the options of `integrate`.
 /// @throws std::invalid_argument for invalid options, and for those that a hand-over does not

@@ -1,6 +1,7 @@
 // Converts settings to the integrators of inclusions. Included once per system.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 #include <vector>
@@ -65,21 +66,23 @@ template <class System, class V>
             .switches = s.switches};
 }
 
+/// The steps of `statistics` are those between implicit ones.
 template <class System>
-[[nodiscard]] TimedRun shown(const HandOverRun<System>& run)
+[[nodiscard]] TimedRun shown(const Run<StateOf<System>>& run)
 {
     TimedRun out;
     out.run.outcome = run.outcome;
-    out.run.t = run.state.t;
-    out.run.x = plain(run.state.w);
+    out.run.t = run.t;
+    out.run.x = plain(run.x);
     out.run.mode = shown_mode<System>(run.mode);
     for (const auto& event : run.events) out.run.events.push_back(shown<System>(event));
     out.run.trajectory.t = run.trajectory.t;
     for (const auto& w : run.trajectory.x) out.run.trajectory.x.push_back(plain(w));
-    out.run.statistics = run.statistics.event_driven;
+    out.run.statistics = run.statistics;
+    out.run.statistics.steps -= std::min(run.set_valued.accepted, run.statistics.steps);
     out.run.statistics.events = run.events.size();
-    if (run.statistics.to_set_valued > 0) out.steps = shown(run.statistics.set_valued);
     for (const MotionPhase& phase : run.phases) {
+        if (phase.set_valued) out.steps = shown(run.set_valued);
         out.phases.push_back({phase.from, phase.set_valued, name(phase.cause)});
     }
     return out;
@@ -93,7 +96,7 @@ template <class System, class Stepping>
     HandOverOptions options = hand_over_options(o);
     options.events_only = settings.set_valued->integrator == "event";
     options.set_valued.step = settings.set_valued->step;
-    return shown(HandOver<System, Stepping>(system, w0, options).take());
+    return shown<System>(HandOver<System, Stepping>(system, w0, options).take());
 }
 
 /// Runs the motion like `motion.run`. @return `running` if it was cancelled

@@ -123,7 +123,7 @@ TEST(Threads, ShareAnInclusionAndItsPolicy)
         motion.run([&](const auto& now) { out.insert(out.end(), {now.t, now.w[0]}); });
         HandOver run(system, start, {.t_end = SlidingMode::t_end});
         const auto done = run.take();
-        out.insert(out.end(), {done.state.t, done.state.w[0]});
+        out.insert(out.end(), {done.t, done.x[0]});
         return out;
     });
 }

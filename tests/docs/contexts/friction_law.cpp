@@ -23,5 +23,5 @@ BLOCK
 int main()
 {
     const auto run = ricochet::hand_over(Braked{}, {3, 0}, {.t_end = 20});
-    return run.outcome == ricochet::Outcome::reached_end && run.state.w[1] == 0 ? 0 : 1;
+    return run.outcome == ricochet::Outcome::reached_end && run.x[1] == 0 ? 0 : 1;
 }

@@ -77,28 +77,19 @@ public:
     {
     }
 
-    [[nodiscard]] HandOverRun<System> take()
+    [[nodiscard]] Run<Vector> take()
     {
         Run<C> done = run_->loop().take();
-        const EndInBranches end = run_->end_in_branches();
-        HandOverRun<System> out;
-        out.outcome = done.outcome;
-        out.state = {done.t, vector(done.x),
-                     Eigen::Map<const ReactionOf<System>>(end.reaction.data())};
-        out.mode = resized_mode<m, M>(end.mode);
-        out.statistics =
-            statistics_by_phase({done.statistics, done.set_valued, done.phases, done.t});
-        out.phases = std::move(done.phases);
-        out.failure = done.failure;
-        out.trajectory.t = done.trajectory.t;
-        for (const C& x : done.trajectory.x) out.trajectory.x.push_back(vector(x));
-        for (const std::vector<double>& r : done.reactions) {
-            out.reactions.push_back(Eigen::Map<const ReactionOf<System>>(r.data()));
-        }
-        out.events.reserve(done.events.size());
+        EndInBranches end = run_->end_in_branches();
         for (std::size_t k = 0; k < done.events.size(); ++k) {
-            out.events.push_back(shown(done.events[k], end.changes[k]));
+            Event<C>& event = done.events[k];
+            event.guard = event.reaction;
+            event.mode_before = resized_mode<m, M>(end.changes[k].before);
+            event.mode_after = resized_mode<m, M>(end.changes[k].after);
         }
+        Run<Vector> out = as_callers<Vector>(std::move(done), Vector{});
+        out.mode = resized_mode<m, M>(end.mode);
+        out.reaction = std::move(end.reaction);
         return out;
     }
 
@@ -124,28 +115,6 @@ private:
         if (!controlled) of.step = given.set_valued.step;
         return make_phased_run<C>(std::move(setup), core_state(x), of);
     }
-    [[nodiscard]] static Vector vector(const C& x)
-    {
-        Vector w;
-        for (Eigen::Index i = 0; i < n; ++i) w[i] = x[static_cast<std::size_t>(i)];
-        return w;
-    }
-    [[nodiscard]] static Event<Vector> shown(const Event<C>& from, const BranchChange& change)
-    {
-        Event<Vector> event;
-        event.t = from.t;
-        event.kind = from.kind;
-        event.guard = event.reaction = from.reaction;
-        event.mode_before = resized_mode<m, M>(change.before);
-        event.mode_after = resized_mode<m, M>(change.after);
-        event.before = vector(from.before);
-        event.after = vector(from.after);
-        event.bracket = from.bracket;
-        event.slope = from.slope;
-        event.error = from.error;
-        return event;
-    }
-
     Beside beside_;
     RunComponents<Beside, X, Stepping, Extremum, Newton> parts_;
     Owner<PhasedRun<C>> run_;
@@ -172,18 +141,20 @@ public:
         motion_.restart(resized<N, M>(from));
     }
 
-    [[nodiscard]] HandOverRun<System> take()
+    [[nodiscard]] Run<StateOf<System>> take()
     {
-        const double from = motion_.state().t;
         const PhaseCause cause = PhaseCause::no_modes;
-        run_.phases.push_back({.from = from, .set_valued = true, .cause = cause});
-        run_.statistics.to_set_valued = 1;
+        run_.phases.push_back({.from = motion_.state().t, .set_valued = true, .cause = cause});
         run_.outcome = options_.events_only ? Outcome::not_handed_over : Outcome::running;
         if (run_.outcome == Outcome::running) emit_samples(true);
         while (run_.outcome == Outcome::running) advance();
-        run_.state = resized<n, m>(motion_.state());
-        run_.statistics.set_valued = motion_.statistics();
-        run_.statistics.set_valued_time = run_.state.t - from;
+        const auto end = resized<n, m>(motion_.state());
+        run_.t = end.t;
+        run_.x = end.w;
+        run_.reaction = numbers_of(end.reaction);
+        run_.set_valued = motion_.statistics();
+        run_.statistics.steps = run_.set_valued.accepted;
+        run_.statistics.events = run_.events.size();
         return std::move(run_);
     }
 
@@ -213,6 +184,11 @@ private:
         }
     }
     void end_with(Outcome outcome) { run_.outcome = outcome; }
+    template <class V>
+    [[nodiscard]] static std::vector<double> numbers_of(const V& v)
+    {
+        return {v.data(), v.data() + v.size()};
+    }
 
     void record_switch()
     {
@@ -244,7 +220,7 @@ private:
             least_.choose(motion_.matrices(), sample_);
             const auto shown = resized<n, m>(sample_);
             run_.trajectory.x.push_back(shown.w);
-            run_.reactions.push_back(shown.reaction);
+            run_.reactions.push_back(numbers_of(shown.reaction));
         }
     }
 
@@ -252,7 +228,7 @@ private:
     Motion motion_;
     State sample_;
     LeastOfState<M> least_;
-    HandOverRun<System> run_;
+    Run<StateOf<System>> run_;
     StallWatch stall_{options_.t_start, options_.t_end, options_.stall_steps};
 };
 

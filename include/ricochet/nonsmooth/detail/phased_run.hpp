@@ -68,15 +68,6 @@ public:
     [[nodiscard]] virtual EndInBranches end_in_branches() const = 0;
 };
 
-/// Counts over a run in phases.
-struct PhasedCounts {
-    const Statistics& all;
-    const SetValuedStatistics& implicit;
-    const std::vector<MotionPhase>& phases;
-    double t_end;  ///< [s] of the run
-};
-[[nodiscard]] HandOverStatistics statistics_by_phase(const PhasedCounts& of);
-
 /// What solves the inclusion of a run with these options.
 /// @throws std::invalid_argument for options that a run with phases does not have.
 [[nodiscard]] BranchPhasesOptions branch_options(const Options& options);
