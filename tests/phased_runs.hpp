@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -88,6 +89,36 @@ inline void expect_times(const std::vector<double>& found, const std::vector<dou
         return std::numeric_limits<double>::infinity();
     };
 }
+
+/// An inclusion whose set is a box, with A the unit matrix and without an offset, as the motion of
+/// a system whose flow is written with the signs of y.
+template <class Set>
+struct WithSigns {
+    static constexpr int n = state_size<Set>, m = reaction_size<Set>;
+    using State = std::array<double, static_cast<std::size_t>(n)>;
+    Set set;
+
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        const StateOf<Set> w = Eigen::Map<const StateOf<Set>>(x.data());
+        const auto box = set.reaction_set(t, w);
+        Eigen::Matrix<double, m, n, m == 1 && n != 1 ? Eigen::RowMajor : Eigen::ColMajor> e;
+        e.setIdentity();
+        if constexpr (requires { set.observe(e); }) set.observe(e);
+        Eigen::Matrix<double, n, m, n == 1 && m != 1 ? Eigen::RowMajor : Eigen::ColMajor> g =
+            e.transpose();
+        if constexpr (requires { set.act(g); }) set.act(g);
+        StateOf<Set> f;
+        set.smooth(t, w, f);
+        for (int i = 0; i < m; ++i) {
+            const double y = e.row(i).dot(w);
+            const auto k = static_cast<std::size_t>(i);
+            f += (y > 0 ? box.lower(k) : y < 0 ? box.upper(k) : 0) * g.col(i);
+        }
+        std::copy_n(f.data(), n, dxdt.begin());
+    }
+    [[nodiscard]] Set set_valued() const { return set; }
+};
 
 /// A body that two contacts hold at once, with bounds 1 and 3, under the load t.
 struct TwoContacts {

@@ -165,6 +165,9 @@ typedef int (*rc_smooth_fn)(void* user, rc_mode mode, double t, const double* w,
  */
 typedef int (*rc_reaction_bounds_fn)(void* user, rc_mode mode, double t, const double* w, size_t n,
                                      double* lower, double* upper, size_t m);
+/** Writes the largest |r| with which each of the `m` reactions holds its y at zero. */
+typedef int (*rc_static_bounds_fn)(void* user, rc_mode mode, double t, const double* w, size_t n,
+                                   double* bounds, size_t m);
 /** Writes s(t) and its rate s'(t), `m` doubles each. */
 typedef int (*rc_surface_fn)(void* user, rc_mode mode, double t, double* s, double* rate, size_t m);
 /** The reset of a change of reaction `which`; `kind` is RC_STICK, RC_SLIP or RC_MODE. Changes the
@@ -198,6 +201,8 @@ typedef struct rc_inclusion {
                                      flow alone is followed; null: 1 for all */
     rc_change_fn change;          /**< null: none */
     rc_start_mode_fn start_mode;  /**< null: the mode stays */
+    rc_static_bounds_fn static_bounds; /**< of static friction, no less than `bounds`, which have to
+                                          contain 0; null: `bounds` hold, too */
 } rc_inclusion;
 
 /** Description of a system. Zero it, then set its size, dimension, flow and other members. */

@@ -130,7 +130,8 @@ class Inclusion:
         offset_rate: Optional[Callable[..., Any]] = None, reactions: Optional[int] = None,
         stands_for: Optional[Sequence[Optional[int]]] = None, in_modes: Optional[Sequence[Any]] = None,
         change: Optional[Callable[..., Any]] = None,
-        start_mode: Optional[Callable[..., Any]] = None) -> None: ...
+        start_mode: Optional[Callable[..., Any]] = None,
+        static_bounds: Optional[Callable[..., Any]] = None) -> None: ...
 
 class Stop(Exception):
     reason: str

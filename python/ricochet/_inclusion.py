@@ -40,6 +40,9 @@ class Inclusion:
         A; by default the unit matrix.
     offset, offset_rate : functions (t) -> numbers, shape (m,)
         s and its rate; both or neither.
+    static_bounds : function (t, x) -> numbers, shape (m,)
+        The largest |r| with which each reaction holds its y at zero, no less than ``bounds``, which
+        have to contain 0: static friction. None: ``bounds`` hold it, too.
     reactions : int
         m, 1 to 4; by default the number of rows of ``observe`` or columns of ``act``, or 1. The
         state has at most 8 components.
@@ -57,9 +60,9 @@ class Inclusion:
 
     def __init__(self, smooth, bounds, *, observe=None, act=None, mass=None, offset=None,
                  offset_rate=None, reactions=None, stands_for=None, in_modes=None, change=None,
-                 start_mode=None):
+                 start_mode=None, static_bounds=None):
         functions = dict(smooth=smooth, bounds=bounds, offset=offset, offset_rate=offset_rate,
-                         change=change, start_mode=start_mode)
+                         change=change, start_mode=start_mode, static_bounds=static_bounds)
         for name, function in functions.items():
             needed = name in ("smooth", "bounds")
             if not callable(function) and (needed or function is not None):

@@ -110,16 +110,36 @@ private:
     }
 };
 
+/// The same with static friction above kinetic friction.
+template <int N, int M>
+struct HeldSystem : SizedSystem<N, M> {
+    [[nodiscard]] double static_bound(double t, const typename SizedSystem<N, M>::Vector& w,
+                                      int i) const
+    {
+        std::array<double, static_cast<std::size_t>(M)> bounds{};
+        this->of->static_bounds(t, w.data(), bounds.data());
+        return bounds[static_cast<std::size_t>(i)];
+    }
+};
+
+template <class System>
+[[nodiscard]] Owner<BranchPhases> make_by(const Shared<const SizedInclusion>& inclusion,
+                                          const BranchPhasesOptions& options)
+{
+    constexpr int N = System::state_size, M = System::reaction_size;
+    const auto n = static_cast<Eigen::Index>(inclusion->size());
+    const auto m = static_cast<Eigen::Index>(inclusion->reactions());
+    const AnyInclusion<N, M> any(inclusion_table<System, N, M>,
+                                 std::make_shared<const System>(System{{inclusion}}), n, m);
+    return make_branch_phases<N, M>(any, options);
+}
+
 template <int N, int M>
 [[nodiscard]] Owner<BranchPhases> make_of(const Shared<const SizedInclusion>& inclusion,
                                           const BranchPhasesOptions& options)
 {
-    const SizedSystem<N, M> system{inclusion};
-    const auto n = static_cast<Eigen::Index>(inclusion->size());
-    const auto m = static_cast<Eigen::Index>(inclusion->reactions());
-    const AnyInclusion<N, M> any(inclusion_table<SizedSystem<N, M>, N, M>,
-                                 std::make_shared<const SizedSystem<N, M>>(system), n, m);
-    return make_branch_phases<N, M>(any, options);
+    if (inclusion->has_static_bounds()) return make_by<HeldSystem<N, M>>(inclusion, options);
+    return make_by<SizedSystem<N, M>>(inclusion, options);
 }
 
 }  // namespace

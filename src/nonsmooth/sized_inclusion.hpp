@@ -32,6 +32,9 @@ public:
     virtual void offset(double t, double* s) const = 0;
     virtual void offset_rate(double t, double* rate) const = 0;
     [[nodiscard]] virtual const SizedMatrices& matrices() const noexcept = 0;
+    /// See static-friction.md.
+    [[nodiscard]] virtual bool has_static_bounds() const noexcept = 0;
+    virtual void static_bounds(double t, const double* w, double* bounds) const = 0;
 };
 
 inline constexpr std::size_t most_components = 8, most_reactions = 4;

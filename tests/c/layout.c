@@ -258,6 +258,7 @@ int main(void)
     AT(rc_inclusion, in_modes);
     AT(rc_inclusion, change);
     AT(rc_inclusion, start_mode);
+    AT(rc_inclusion, static_bounds);
     SIZE(rc_phase);
     AT(rc_phase, size);
     AT(rc_phase, from);

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "phased_runs.hpp"
 #include "ricochet/nonsmooth/hand_over.hpp"
 #include "ricochet/simulation.hpp"
 
@@ -185,7 +186,7 @@ struct Ticking {
 
 Run<std::array<double, 1>> tick(const Ticking& system, double w0, double t_end)
 {
-    return integrate(system, {w0}, {.t_end = t_end, .rtol = 1e-10, .atol = 1e-12});
+    return run_of(system, std::array{w0}, until(t_end));
 }
 
 TEST(StaticFriction, ATickAtTheStaticBoundChangesNothing)
@@ -212,6 +213,25 @@ TEST(StaticFriction, AResetThatCarriesTheBlockAcrossRestIsNoStop)
     EXPECT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_NEAR(run.x[0], -0.8, 1e-9);
     for (const auto& event : run.events) EXPECT_NE(event.kind, EventKind::stick);
+}
+
+// The runs of inclusions above, through all adapters.
+TEST(StaticFriction, BesideAFlowItIsTheSame)
+{
+    using One = std::array<double, 1>;
+    using Two = std::array<double, 2>;
+    const auto block = [](auto load) { return WithSigns<Block>{{.load = load}}; };
+    const auto grows = run_of(block([](double t) { return t / 5; }), One{0}, until(6));
+    expect_end(grows, One{0.6});
+    expect_times(times_of(grows.events, EventKind::slip), {5});
+    expect_end(run_of(block([](double) { return 1.0; }), One{0}, until(2)), One{0}, 0);
+    const auto stops = run_of(block([](double) { return -0.7; }), One{1.2}, until(3));
+    expect_end(stops, One{0}, 0);
+    expect_times(times_of(stops.events, EventKind::stick), {1});
+    expect_end(run_of(WithSigns<Joints>{}, Two{0, 0}, until(2)), Two{1.3, -1.6});
+    const WithSigns<Joints> later{{.second = -0.7}}, equal{{.kinetic = 1}};
+    expect_end(run_of(later, Two{0, 0}, until(2)), Two{1.1525, -1.305});
+    expect_end(run_of(equal, Two{0, 0}, until(2)), Two{0.34, -0.18});
 }
 
 TEST(StaticFriction, ASimulationGoesOnFromASnapshotOfAHeldBlock)
@@ -250,7 +270,7 @@ struct TickingPair {
 
 TEST(StaticFriction, SpeedsThatAreEqualUpToRoundingAreHeldOn)
 {
-    const auto run = integrate(TickingPair{}, {1.0, 0.0}, {.t_end = 3});
+    const auto run = run_of(TickingPair{}, std::array{1.0, 0.0}, until(3));
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     ASSERT_EQ(run.events.size(), 2u);
     EXPECT_EQ(run.events[0].kind, EventKind::stick);
@@ -299,24 +319,131 @@ TEST(StaticFriction, ASetThatJumpsWhereTheMotionRestsIsRefused)
     }
 }
 
-/// Two contacts of one block share its load in many ways.
+// --- several contacts of one block ---
+
+/// Two contacts of one block, of static bounds 1 and 3 and half of them where it moves.
 struct OneBlock {
     static constexpr int state_size = 1, reaction_size = 2;
     using W = Eigen::Matrix<double, 1, 1>;
-    void smooth(double t, const W&, W& f) const { f[0] = t; }
-    [[nodiscard]] sets::Box<2> reaction_set(double, const W&) const
+    double load = 0, growth = 1;  ///< the load is load + growth t
+
+    void smooth(double t, const W&, W& f) const { f[0] = load + growth * t; }
+    [[nodiscard]] static sets::Box<2> reaction_set(double, const W&)
     {
         return {{-0.5, -1.5}, {0.5, 1.5}};
     }
-    [[nodiscard]] double static_bound(double, const W&, int i) const { return i == 0 ? 1 : 3; }
-    void observe(Eigen::Matrix<double, 2, 1>& e) const { e << 1, 1; }
+    [[nodiscard]] static double static_bound(double, const W&, int i) { return i == 0 ? 1 : 3; }
+    static void observe(Eigen::Matrix<double, 2, 1>& e) { e << 1, 1; }
 };
 
-TEST(StaticFriction, ReactionsThatYDoesNotDetermineEndTheRunWithItsReason)
+TEST(StaticFriction, TwoContactsOfOneBlockHoldTogetherAndSlipTogether)
 {
-    const auto run = hand_over(OneBlock{}, OneBlock::W{0}, {.t_end = 6});
-    EXPECT_EQ(run.outcome, Outcome::not_handed_over);
+    // They hold 4 between them, and 2 where the block moves: (t - 4)^2 / 2 + 2 (t - 4) after 4.
+    // Of all reactions that hold it they are the least.
+    for (const double way : {1.0, -1.0}) {
+        HandOverOptions options{.t_end = 6, .sample_times = {2, 3, 3.9, 5}};
+        const auto run = hand_over(OneBlock{.growth = way}, OneBlock::W{0}, options);
+        ASSERT_EQ(run.outcome, Outcome::reached_end);
+        ASSERT_EQ(run.events.size(), 2U);
+        for (std::size_t i = 0; i < 2; ++i) {
+            EXPECT_EQ(run.events[i].kind, EventKind::slip);
+            EXPECT_EQ(run.events[i].reaction, i);
+            EXPECT_NEAR(run.events[i].t, 4, 1e-11);
+        }
+        EXPECT_NEAR(run.x[0], way * 6, 1e-9);
+        const double least[4][2] = {{1, 1}, {1, 2}, {1, 2.9}, {0.5, 1.5}};
+        for (std::size_t k = 0; k < 4; ++k) {
+            EXPECT_NEAR(run.reactions[k][0], -way * least[k][0], 1e-12) << k;
+            EXPECT_NEAR(run.reactions[k][1], -way * least[k][1], 1e-12) << k;
+        }
+    }
 }
+
+TEST(StaticFriction, TwoContactsHoldABlockThatStopsUnderALoadBetweenTheirBounds)
+{
+    // w' = -3 - 2 from 5: at rest at 1, where 3 of 4 are needed.
+    const auto run = hand_over(OneBlock{-3, 0}, OneBlock::W{5}, {.t_end = 3});
+    ASSERT_EQ(run.outcome, Outcome::reached_end);
+    ASSERT_EQ(run.events.size(), 2U);
+    for (const auto& event : run.events) {
+        EXPECT_EQ(event.kind, EventKind::stick);
+        EXPECT_NEAR(event.t, 1, 1e-12);
+    }
+    EXPECT_EQ(run.x[0], 0);
+    EXPECT_NEAR(run.reaction[0], 1, 1e-12);
+    EXPECT_NEAR(run.reaction[1], 2, 1e-12);
+    const WithSigns<OneBlock> beside{};
+    const auto slips = run_of(beside, std::array{0.0}, until(6));
+    expect_end(slips, std::array{6.0});
+    expect_times(times_of(slips.events, EventKind::slip), {4, 4});
+    expect_end(run_of(WithSigns<OneBlock>{{-3, 0}}, std::array{5.0}, until(3)), std::array{0.0}, 0);
+    // A load of just what they hold, and one beyond it.
+    EXPECT_EQ(hand_over(OneBlock{4, 0}, OneBlock::W{0}, {.t_end = 1}).x[0], 0);
+    EXPECT_NEAR(hand_over(OneBlock{4.5, 0}, OneBlock::W{0}, {.t_end = 1}).x[0], 2.5, 1e-9);
+}
+
+/// Two blocks on each other, pulled by t: contact 0 between them, 1 and 2 of the lower one with
+/// the ground, the last over a lever of 2.
+struct ThreeContacts {
+    using State = std::array<double, 2>;
+    struct Motion {
+        static constexpr int state_size = 2, reaction_size = 3;
+        using W = Eigen::Vector2d;
+        static void smooth(double t, const W&, W& f) { f << 0, t; }
+        [[nodiscard]] static sets::Box<3> reaction_set(double, const W&)
+        {
+            return {{-0.25, -0.5, -0.5}, {0.25, 0.5, 0.5}};
+        }
+        [[nodiscard]] static double static_bound(double, const W&, int) { return 1; }
+        static void observe(Eigen::Matrix<double, 3, 2>& e) { e << 1, -1, 0, 1, 0, -2; }
+    };
+    static void flow(double t, const State& x, State& dxdt)
+    {
+        const auto sign = [](double y) { return y > 0 ? 1 : y < 0 ? -1 : 0; };
+        const double between = -0.25 * sign(x[0] - x[1]);
+        dxdt = {between, t - between - 1.5 * sign(x[1])};
+    }
+    [[nodiscard]] static double next_time_event(double t) { return std::floor(t) + 1; }
+    [[nodiscard]] static Motion set_valued() { return {}; }
+};
+
+TEST(StaticFriction, ContactsWithTheGroundSlipTogetherUnderABlockThatRidesOn)
+{
+    // The ground holds 1 + 2 up to 3, and 1.5 after it: there the upper block is carried by half
+    // of 1.5, less than 1, and both have the acceleration (t - 1.5) / 2. At 3.5 it would need 1,
+    // and slips: v = (0.5 * 0.75 + 0.5^2 / 4 = 0.4375) there, then 1/4, and t - 1.75.
+    const Options options = until(4);
+    const auto run = run_of(ThreeContacts{}, ThreeContacts::State{0, 0}, options);
+    expect_end(run, ThreeContacts::State{0.4375 + 0.125, 0.4375 + 0.5 * (1.75 + 2.25) / 2}, 1e-9);
+    std::array<std::vector<double>, 3> slips;
+    for (const auto& event : run.events) {
+        if (event.kind == EventKind::slip) slips[event.reaction].push_back(event.t);
+    }
+    expect_times(slips[0], {3.5});
+    expect_times(slips[1], {3});
+    expect_times(slips[2], {3});
+}
+
+/// Three relays in a plane, of which one is the sum of the others.
+struct InAPlane {
+    static constexpr int state_size = 2, reaction_size = 3;
+    using W = Eigen::Vector2d;
+    static void smooth(double, const W&, W& f) { f << 0.5, 0.25; }
+    [[nodiscard]] static sets::Box<3> reaction_set(double, const W&)
+    {
+        return {{-1, -1, -1}, {1, 1, 1}};
+    }
+    [[nodiscard]] static double static_bound(double, const W&, int) { return 2; }
+    static void observe(Eigen::Matrix<double, 3, 2>& e) { e << 1, 0, 0, 1, 1, 1; }
+};
+
+TEST(StaticFriction, ReactionsThatAreCombinationsOfOthersEndTheRunWithItsReason)
+{
+    EXPECT_EQ(hand_over(InAPlane{}, InAPlane::W(0, 0), {.t_end = 1}).outcome,
+              Outcome::not_handed_over);
+}
+
+// --- on a plane ---
 
 /// A body on a plane, A v' = f(t) + r, where |r| is at most `at_rest` and, where v moves,
 /// `kinetic`.
@@ -365,6 +492,32 @@ TEST(StaticFriction, ADiscLeavesAlongTheDirectionThatItsKineticLawHasThere)
     EXPECT_NEAR(rate.norm(), 0.228073260292, h);
     EXPECT_NEAR(rate[0] / rate.norm(), 0.824092893837, h);
     EXPECT_NEAR(rate[1] / rate.norm(), 0.566454678087, h);
+}
+
+/// The disc with a flow beside it.
+struct BesideADisc {
+    using State = std::array<double, 2>;
+    Disc disc;
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        const Disc::W f = disc.load(t), v(x[0], x[1]);
+        const Disc::W force = f - disc.kinetic * v / std::max(v.norm(), 1e-300);
+        dxdt = {force[0], force[1] / disc.second_mass};
+    }
+    [[nodiscard]] Disc set_valued() const { return disc; }
+};
+
+TEST(StaticFriction, ADiscBesideAFlowSlipsAsItDoesAlone)
+{
+    using Two = BesideADisc::State;
+    const auto load = [](double t) { return Disc::W(Disc::W(0.6, 0.8) * t); };
+    const auto slow = [](double t) { return Disc::W(Disc::W(0.6, 0.8) * t / 5); };
+    const double h = 1e-5, rate = 0.228073260292;
+    expect_end(run_of(BesideADisc{{.load = slow}}, Two{0, 0}, until(6)), Two{0.36, 0.48}, of_steps);
+    const BesideADisc unequal{{.load = load, .second_mass = 4}};
+    const auto run = run_of(unequal, Two{0, 0}, until(1 + h));
+    const Two along{0.824092893837 * rate, 0.566454678087 * rate};
+    expect_end(run, Two{along[0] * h, along[1] * h}, h * h);
 }
 
 TEST(StaticFriction, ADiscIsHeldWhereItStopsUnderALoadBetweenItsBounds)

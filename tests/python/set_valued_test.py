@@ -46,6 +46,16 @@ def through_all_doors(system, x0, t_end, **options):
     return run
 
 
+def test_static_bounds_hold_more_than_the_others():
+    # Two contacts of one block hold 1 + 3 at rest and 2 where it moves: it slips at 4.
+    friction = Inclusion(lambda t, x: [t], lambda t, x: ([-0.5, -1.5], [0.5, 1.5]),
+                         observe=[[1], [1]], static_bounds=lambda t, x: [1, 3])
+    system = System(lambda t, x: [t - 2 * sign(x[0])], set_valued=friction)
+    run = through_all_doors(system, [0.0], 6.0)
+    np.testing.assert_allclose(times(run, Kind.SLIP), [4, 4], **CLOSE)
+    np.testing.assert_allclose(run.x, [6], **CLOSE)
+
+
 def test_a_block_stops_and_slips_again():
     # 1/4 - t + t^2 / 4 until it is zero; held until the load is 1.
     run = through_all_doors(block(lambda t: t / 2), [0.25], 4.0)

@@ -23,6 +23,7 @@
 #include "ricochet/detail/components.hpp"
 #include "ricochet/detail/filippov_motion.hpp"
 #include "ricochet/nonsmooth/composite_step.hpp"
+#include "ricochet/nonsmooth/detail/least_reaction.hpp"
 #include "ricochet/system.hpp"
 
 namespace ricochet {
@@ -153,10 +154,17 @@ public:
         return {flow_, matrices_.inclusion().system(), &terms_};
     }
 
-    /// Reactions and rates in a mode at (t, w).
+    /// The reactions in a mode at (t, w): of those with the same effect the least.
     [[nodiscard]] Reaction reaction(Mode mode, double t, const Vector& w) const
     {
-        return motion(mode, t, w).reaction;
+        Motion now = motion(mode, t, w);
+        Reaction r = now.reaction;
+        if (mode >= branch_modes || !terms_.holds[mask_of(mode)].joint) return r;
+        for (Eigen::Index i = 0; i < M; ++i) {
+            if (!is_held(i, mode)) now.lower[i] = now.upper[i] = r[i];
+        }
+        LeastReaction<M>(matrices_.act(), count()).choose(now.lower, now.upper, r);
+        return r;
     }
 
     /// How far every held reaction is from its bounds; infinite where there is no bound, and for
@@ -280,7 +288,12 @@ private:
         std::array<Eigen::Index, static_cast<std::size_t>(M)> held{};
         Eigen::Index count = 0;
         for (Eigen::Index i = 0; i < M; ++i) {
-            if (mask >> i & 1) held[static_cast<std::size_t>(count++)] = i;
+            if (!(mask >> i & 1)) continue;
+            if (first_with(i, mask) == i) {
+                held[static_cast<std::size_t>(count++)] = i;
+            } else {
+                hold.joint = true;
+            }
         }
         if (count == 0) return;
         Eigen::MatrixXd block(count, count);
@@ -350,9 +363,25 @@ private:
             out.upper[i] = matrices_.inclusion().static_bound(t, w, i);
             out.lower[i] = -out.upper[i];
         }
+        if (holds(mode)) divide(mask_of(mode), out.upper, out.reaction);
     }
 
     // --- static bounds, see static_bounds.hpp ---
+
+    /// How many times the effect of reaction j reaction i has, on the motion and on y; 0 where
+    /// their effects are different ones.
+    [[nodiscard]] double times_effect(Eigen::Index i, Eigen::Index j) const;
+    /// The first of the reactions of a mask with the effect of reaction i, which is one of them.
+    [[nodiscard]] Eigen::Index first_with(Eigen::Index i, std::size_t mask) const
+    {
+        if (!matrices_.traits().gives_static_bound) return i;
+        Eigen::Index j = 0;
+        while (!(mask >> j & 1) || times_effect(i, j) == 0) ++j;
+        return j;
+    }
+    /// Divides what one held reaction has for all with its effect in the ratio of their static
+    /// bounds, so that they meet them together.
+    void divide(std::size_t mask, const Reaction& most, Reaction& r) const;
 
     /// What acts on reactions whose y is zero.
     struct Loads {
@@ -367,9 +396,9 @@ private:
     };
     /// @throws std::invalid_argument for a static bound below the kinetic one.
     [[nodiscard]] Loads static_loads(double t, const Vector& w) const;
-    /// The reactions where those not inside are `known`, and y' is `rate` without reactions.
+    /// The reactions where those not inside are `known`.
     [[nodiscard]] Reaction held_by(const Branches& at, const Reaction& known,
-                                   const Reaction& rate) const;
+                                   const Loads& loads) const;
     /// Whether the room of held reaction i below its upper, or above its lower bound will fall from
     /// here: the first of its first two derivatives that is not rounding is negative.
     [[nodiscard]] bool room_falls(Eigen::Index i, bool upper, Mode mode, double t,

@@ -57,6 +57,15 @@ public:
     {
         return of_.matrices();
     }
+    [[nodiscard]] bool has_static_bounds() const noexcept override
+    {
+        return of_.callbacks().static_bounds != nullptr;
+    }
+    void static_bounds(double t, const double* w, double* bounds) const override
+    {
+        heed(of_.callbacks().static_bounds(user(), mode_, t, w, size(), bounds, reactions()),
+             "static_bounds", t);
+    }
 
 private:
     void read_offset(double t, double* s, double* rate) const

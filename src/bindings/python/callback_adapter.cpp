@@ -621,6 +621,15 @@ public:
     {
         return of_.matrices;
     }
+    [[nodiscard]] bool has_static_bounds() const noexcept override
+    {
+        return static_cast<bool>(of_.static_bounds);
+    }
+    void static_bounds(double t, const double* w, double* bounds) const override
+    {
+        read(adapter_.call(of_.static_bounds, mode_, t, show(w)).get(), "static_bounds",
+             reactions(), bounds);
+    }
 
 private:
     [[nodiscard]] PyObject* show(const double* w) const

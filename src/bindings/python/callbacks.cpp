@@ -293,6 +293,7 @@ void CallbackSource::read_inclusion(PyObject* specification)
     of.offset_rate = function("offset_rate");
     of.change = function("change");
     of.start_mode = function("start_mode");
+    of.static_bounds = function("static_bounds");
     const auto matrix = [&](const char* key) {
         const Ref rows = item(specification, key);
         std::vector<double> out;

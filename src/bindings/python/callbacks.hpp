@@ -63,7 +63,7 @@ struct CallbackGuard {
 
 /// Set-valued motion.
 struct CallbackInclusion {
-    Function smooth, bounds, offset, offset_rate, change, start_mode;
+    Function smooth, bounds, offset, offset_rate, change, start_mode, static_bounds;
     detail::SizedMatrices matrices;
     std::size_t components = 0;  ///< of the matrices; 0: none is given
     std::size_t reactions = 1;

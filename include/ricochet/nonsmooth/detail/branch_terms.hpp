@@ -34,11 +34,13 @@ template <int N, int M>
 struct RICOCHET_ALIGNED BranchTerms {
     using Delassus = Eigen::Matrix<double, M, M>;
 
-    /// D^-1 where reactions are held, zero elsewhere.
+    /// D^-1 where reactions are held, zero elsewhere. Of reactions that act on the same motion it
+    /// has the first one, which stands for all of them, if static bounds hold them.
     struct Hold {
         Delassus inverse;
         double largest = 0;
         bool determined = true;
+        bool joint = false;  ///< some stand for others
     };
 
     using Action =

@@ -7,6 +7,9 @@
 // their static bounds. Else the one that meets its static bound first is released: as the loads
 // grow from nothing, and later as the reaction released last falls from its static to its kinetic
 // bound. It leaves to the side of its load, and the others are asked again.
+//
+// Reactions that act on the same motion, such as those of two contacts of one block, hold it as
+// long as all of them together suffice. They are then at a bound together.
 #pragma once
 
 #include <algorithm>
@@ -77,15 +80,57 @@ auto AnyModes<N, M>::static_loads(double t, const Vector& w) const -> Loads
 }
 
 template <int N, int M>
-auto AnyModes<N, M>::held_by(const Branches& at, const Reaction& known, const Reaction& rate) const
+double AnyModes<N, M>::times_effect(Eigen::Index i, Eigen::Index j) const
+{
+    if (i == j) return 1;
+    // That of b in the direction of a, where a is a multiple of b.
+    const auto ratio = [](const auto& a, const auto& b) {
+        const double of = b.squaredNorm() > 0 ? a.dot(b) / b.squaredNorm() : 0;
+        return (a - of * b).norm() <= 1e-12 * a.norm() ? of : 0;
+    };
+    const double on_motion = ratio(terms_.lever.col(i), terms_.lever.col(j));
+    const double on_y = ratio(terms_.observe.row(i), terms_.observe.row(j));
+    return on_motion * on_y > 0 ? on_motion : 0;
+}
+
+template <int N, int M>
+void AnyModes<N, M>::divide(std::size_t mask, const Reaction& most, Reaction& r) const
+{
+    if (!terms_.holds[mask].joint) return;
+    const auto is_of = [&](Eigen::Index i, Eigen::Index j) {
+        return (mask >> i & 1) && first_with(i, mask) == j;
+    };
+    for (Eigen::Index j = 0; j < count(); ++j) {
+        if (!is_of(j, j)) continue;
+        double all = 0, unbounded = 0;
+        for (Eigen::Index i = 0; i < count(); ++i) {
+            if (!is_of(i, j)) continue;
+            all += std::abs(times_effect(i, j)) * most[i];
+            if (std::isinf(most[i])) unbounded += std::abs(times_effect(i, j));
+        }
+        if (all == 0) continue;
+        const double part = r[j] / (unbounded > 0 ? unbounded : all);
+        for (Eigen::Index i = 0; i < count(); ++i) {
+            if (!is_of(i, j)) continue;
+            // Those without a bound have all.
+            const double weight = unbounded > 0 ? (std::isinf(most[i]) ? 1 : 0) : most[i];
+            r[i] = std::copysign(weight, times_effect(i, j)) * part;
+        }
+    }
+}
+
+template <int N, int M>
+auto AnyModes<N, M>::held_by(const Branches& at, const Reaction& known, const Loads& loads) const
     -> Reaction
 {
     Reaction r = known;
     for (Eigen::Index i = 0; i < M; ++i) {
         if (at[i] == Branch::inside) r[i] = 0;
     }
-    const Reaction free = rate + times(terms_.delassus, r);
-    r -= times(terms_.holds[mask_of(mode_of(at))].inverse, free);
+    const std::size_t mask = mask_of(mode_of(at));
+    const Reaction free = loads.rate + times(terms_.delassus, r);
+    r -= times(terms_.holds[mask].inverse, free);
+    divide(mask, loads.most, r);
     return r;
 }
 
@@ -121,7 +166,7 @@ Mode AnyModes<N, M>::settle_static(Branches at, std::size_t fired, double t, con
     for (;;) {
         const Mode mode = mode_of(at);
         if (!terms_.holds[mask_of(mode)].determined) return no_flow;
-        const Reaction r = held_by(at, known, loads.rate);
+        const Reaction r = held_by(at, known, loads);
         const double rounding = negligible * (terms_.holds[mask_of(mode)].largest *
                                                   loads.rate.template lpNorm<Eigen::Infinity>() +
                                               r.template lpNorm<Eigen::Infinity>());
@@ -151,7 +196,7 @@ Mode AnyModes<N, M>::settle_static(Branches at, std::size_t fired, double t, con
             known[i] = loads.kinetic(i, others[i]);
         }
         at = others;
-        if (terms_.holds[mask_of(mode_of(at))].determined) from = held_by(at, start, loads.rate);
+        if (terms_.holds[mask_of(mode_of(at))].determined) from = held_by(at, start, loads);
     }
 }
 
