@@ -649,7 +649,7 @@ PhaseRules::Verdict PhaseRules::review(const Step& step, double* x)
     }
     if (has_own_guards(step.kind)) return review_own(step, x);
     if (is_explicit(step.kind)) return review_explicit(step.kind, step.t, x);
-    return review_implicit(step.kind, step.t, step.has_advanced, x);
+    return review_implicit(step, x);
 }
 
 bool PhaseRules::may_arrive(const Step& step, double reach)
@@ -681,6 +681,10 @@ PhaseRules::Verdict PhaseRules::review_own(const Step& step, const double* x)
     if (is_approach(step.kind)) {
         if (may_arrive(step, 4 * step.h_next)) return {};
         return change_to(own, step.t, PhaseCause::released, -1);
+    }
+    if (may_arrive_unseen(step, 2)) {
+        const Kind kind = go_by_steps(PhaseCause::no_modes, step.t, x);
+        return change_to(kind, step.t, PhaseCause::no_modes, options_.step);
     }
     if (!inclusion().has_branches() || !may_arrive(step, 2 * step.h_next)) return {};
     const Mode b = inclusion().signs(step.t, x);
@@ -721,9 +725,11 @@ PhaseRules::Verdict PhaseRules::review_explicit(Kind kind, double t, double* x)
     return {};
 }
 
-PhaseRules::Verdict PhaseRules::review_implicit(Kind kind, double t, bool has_advanced, double* x)
+PhaseRules::Verdict PhaseRules::review_implicit(const Step& step, double* x)
 {
-    if (has_advanced) {
+    const Kind kind = step.kind;
+    const double t = step.t;
+    if (step.has_advanced) {
         ++memory_.steps;
         ++implicit_steps_;
         if (inclusion().law() > 1e-6) {
@@ -737,7 +743,7 @@ PhaseRules::Verdict PhaseRules::review_implicit(Kind kind, double t, bool has_ad
         if (b != static_cast<Mode>(memory_.across)) memory_.steps = 0;
         memory_.across = b;
     }
-    if (lets_go(b, t, x)) return release(t);
+    if (lets_go(b, t, x) && !may_arrive_unseen(step, 4)) return release(t);
     if (memory_.steps < memory_.patience || !inclusion().flows(b)) return {};
     // The branch of a y that has just left zero tells its direction, so that its size is not
     // tested.

@@ -29,7 +29,8 @@ using Kind = Mode;
 struct PhaseOptions {
     double t_start = 0, t_end = 0;  ///< [s]
     double rtol = 0, atol = 0;
-    double step = 0;  ///< [s] longest implicit steps; with fixed steps their length
+    double step = 0;     ///< [s] longest implicit steps; with fixed steps their length
+    bool fixed = false;  ///< steps of the own flow have that length, too
     std::optional<AloneOptions> alone{};
 };
 
@@ -349,6 +350,13 @@ private:
 
     /// Whether a watched y may arrive at zero within `reach` [s].
     [[nodiscard]] bool may_arrive(const Step& step, double reach);
+    /// The same within some steps of fixed length of a flow beside an inclusion without branches:
+    /// such steps do not end where the flow jumps, and implicit ones are taken there.
+    [[nodiscard]] bool may_arrive_unseen(const Step& step, int steps)
+    {
+        if (!options_.fixed || inclusion().has_branches()) return false;
+        return inclusion().decides_at_zero() && may_arrive(step, steps * options_.step);
+    }
     /// Whether the flow of the system is that of the inclusion in branches b.
     [[nodiscard]] bool is_flow_of(Mode b, const Step& step, const double* x);
     [[nodiscard]] static constexpr Mode other_side(std::size_t i, Mode b) noexcept
@@ -359,7 +367,7 @@ private:
     [[nodiscard]] Verdict ask(const End& end, double* x, PhaseCause cause);
     [[nodiscard]] Verdict review_own(const Step& step, const double* x);
     [[nodiscard]] Verdict review_explicit(Kind kind, double t, double* x);
-    [[nodiscard]] Verdict review_implicit(Kind kind, double t, bool has_advanced, double* x);
+    [[nodiscard]] Verdict review_implicit(const Step& step, double* x);
     [[nodiscard]] Verdict change_to(Kind kind, double t, PhaseCause cause, double h = 0);
     /// The system's own flow is followed again; an inclusion alone ends.
     [[nodiscard]] Verdict release(double t);

@@ -53,6 +53,7 @@ private:
         const HandOverOptions of = completed(options_of_phases(options), false);
         out.atol = of.atol;
         out.step = error_controlled ? of.set_valued.step : options.step;
+        out.fixed = !error_controlled;
         return out;
     }
 

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <vector>
@@ -400,6 +401,68 @@ TEST(PhasesBySteps, FixedImplicitStepsHaveTheGivenLength)
     EXPECT_NEAR(run.x[0], 2, 1e-4);
     EXPECT_NEAR(static_cast<double>(run.set_valued.accepted), 400, 20);
     EXPECT_GT(run.statistics.steps, run.set_valued.accepted);
+}
+
+/// The same by steps, with a new simulation after every tenth.
+template <class System, class X>
+[[nodiscard]] X fixed_end_by_snapshots(const System& system, const X& x0, Options options)
+{
+    options.step = 0.01;
+    const auto start = [&] {
+        return std::make_unique<Simulation<System, X, FixedStep<Rk4>>>(system, x0, options,
+                                                                       FixedStep<Rk4>{});
+    };
+    auto simulation = start();
+    for (int steps = 1; simulation->step(); ++steps) {
+        if (steps % 10 != 0) continue;
+        const Snapshot saved = simulation->save();
+        simulation = start();
+        simulation->restore(saved);
+    }
+    return simulation->x();
+}
+
+TEST(PhasesBySteps, FixedStepsStopBlocksBetweenTheirEnds)
+{
+    // As above, with stops inside of steps; the load is constant then.
+    constexpr std::size_t count = 6;
+    Blocks::State x0(count + 2);
+    for (std::size_t i = 0; i < count; ++i) x0[i] = 0.0977 * static_cast<double>(i + 1);
+    x0[count] = 1.125;
+    const Blocks blocks{count};
+    Options options{.t_end = 3};
+    options.sample_times = {0.35, 1.9};
+    const auto run = fixed_run(blocks, x0, options);
+    Blocks::State expected(count + 2, 0.5);
+    expected[count] = 1.125;
+    expected[count + 1] = 0;
+    expect_end(run, expected);
+    EXPECT_FALSE(run.phases[0].set_valued);
+    ASSERT_EQ(run.trajectory.x.size(), 2U);
+    for (std::size_t i = 0; i < count; ++i) {
+        EXPECT_NEAR(run.trajectory.x[0][i], std::max(x0[i] - 0.35, 0.0), exact_motion) << i;
+        EXPECT_NEAR(run.trajectory.x[1][i], 0, 1e-12) << i;
+    }
+    EXPECT_EQ(fixed_end_by_snapshots(blocks, x0, options), run.x);
+}
+
+TEST(PhasesBySteps, FixedStepsStopADiscAndLetItSlip)
+{
+    // Along (3, 4): v = 0.9 - t + t^2 / 10 until 1, rest until the load is 1 at 5, (t - 5)^2 / 10.
+    // Steps of 0.01 do not meet the slip from 0.003 on; the one across it misses its own length of
+    // the load twice, and the one across the stop that of the speed.
+    for (const double from : {0.0, 0.003}) {
+        Options options{.t_start = from, .t_end = 6};
+        const double v = 0.9 - from + from * from / 10;
+        const Plane::State x0{0.6 * v, 0.8 * v, 1.125 - from * from / 2, -from};
+        const auto run = fixed_run(Plane{}, x0, options);
+        expect_end(run, Plane::State{0.06, 0.08, 1.125, 0}, 1e-4);
+        expect_times(times_at(run.events, 0, EventKind::crossing), {1.5, 4.5});
+        options.t_end = 4.9;
+        const auto held = fixed_run(Plane{}, x0, options);
+        EXPECT_LT(std::hypot(held.x[0], held.x[1]), 1e-9);
+        EXPECT_EQ(fixed_end_by_snapshots(Plane{}, x0, options), held.x);
+    }
 }
 
 // --- other methods ---
