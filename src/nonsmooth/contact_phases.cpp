@@ -50,7 +50,7 @@ Mode ContactPhases<C>::enter(Mode mode, double t, const C& x)
     if (mode >= (modes > 0 ? modes : own_modes - 1)) throw_unknown_mode("integrate", mode, modes);
     while (!phases_listed_.empty() && phases_listed_.back().from > t) phases_listed_.pop_back();
     if (phases_listed_.empty()) note(false, t, PhaseCause::start);
-    if (may_fly(x)) {
+    if (may_fly(x) && !setup_.steps->will_push({mode, t, x.data()}, step_)) {
         if (memory_.in_contact != 0) note(false, t, PhaseCause::released);
         return in_flight(mode, x);
     }

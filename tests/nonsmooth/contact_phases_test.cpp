@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <random>
 #include <stdexcept>
@@ -418,6 +419,49 @@ TEST(ContactPhases, ABallRidesAPlateUntilItFallsFasterThanTheBall)
 struct Belt : Puck {
     static void surface_rates(double, const V2&, V2& b) { b << 0, -2; }
 };
+
+/// A ball on a plate, at `height` with the speed `speed`, under a load.
+struct OnAPlate {
+    static constexpr int coordinates = 1;
+    static constexpr int contacts = 1;
+    static constexpr int tangents = 1;
+    std::function<double(double)> height, speed, load;
+    static void mass(const V1&, V1& m) { m[0] = 1; }
+    void force(double t, const V1&, const V1&, V1& f) const { f[0] = load(t); }
+    void gaps(double t, const V1& q, V1& g) const { g[0] = q[0] - height(t); }
+    static void directions(double, const V1&, V2& h) { h << 1, 0; }
+    void surface_rates(double t, const V1&, V2& b) const { b << -speed(t), 0; }
+    static double restitution(int) { return 0.5; }
+    static double friction(int) { return 0; }
+};
+
+TEST(ContactPhases, AStartWhereNothingPressesYetDecidesAsAChange)
+{
+    const HandOverOptions options{.t_end = 3, .set_valued = {.step = 3e-3}};
+    const auto still = [](double) { return 0.0; };
+    const auto follow = [&](const OnAPlate& ball) {
+        return hand_over(ball, V1(ball.height(0)), V1(ball.speed(0)), options);
+    };
+    // A plate with the acceleration of free fall at its crest: the ball presses from there on.
+    const double w = std::sqrt(10.0);
+    const auto rides =
+        follow({[w](double t) { return std::cos(w * t); },
+                [w](double t) { return -w * std::sin(w * t); }, [](double) { return -10.0; }});
+    EXPECT_EQ(rides.outcome, Outcome::reached_end);
+    EXPECT_TRUE(rides.events.empty());
+    EXPECT_EQ(rides.phases.back().from, 0);
+    EXPECT_EQ(rides.phases.back().cause, PhaseCause::held);
+    // The position drifts by the error of the trapezium rule, 3e-3^2 w^2 / 12 of the amplitude.
+    EXPECT_NEAR(rides.x[0], std::cos(3 * w), 7.5e-6);
+    const auto pressed = follow({still, still, [](double t) { return -t; }});
+    EXPECT_TRUE(pressed.events.empty());
+    EXPECT_EQ(pressed.phases.back().cause, PhaseCause::held);
+    EXPECT_EQ(pressed.x[0], 0);
+    // A load that lifts it from there on leaves it in flight, as exact as its steps.
+    const auto lifted = follow({still, still, [](double t) { return t; }});
+    EXPECT_EQ(lifted.phases.size(), 1U);
+    EXPECT_NEAR(lifted.x[0], 4.5, 1e-12);
+}
 
 TEST(ContactPhases, ABeltCarriesWhatLiesOnIt)
 {

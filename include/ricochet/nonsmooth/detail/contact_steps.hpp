@@ -43,6 +43,9 @@ public:
     [[nodiscard]] virtual bool take_to(const ContactStart& from, double s, double* x) = 0;
     /// The mean rate of a step of length h from anywhere.
     virtual void mean_rate(const ContactStart& from, double h, double* dxdt) = 0;
+    /// Whether some contact is closed and at rest at a start, where forces neither press on it nor
+    /// lift it by more than rounding, and is pressed on within the next h [s].
+    [[nodiscard]] virtual bool will_push(const ContactStart& from, double h) const = 0;
     /// Whether no contact pushed in the step that was taken, all are open at (t, x) after it, and
     /// dry friction holds nothing.
     [[nodiscard]] virtual bool is_free(double t, const double* x) const = 0;
@@ -113,6 +116,19 @@ public:
             a = free;
         }
     }
+    [[nodiscard]] bool will_push(const ContactStart& from, double h) const override
+    {
+        State at = step_.start(from.t, Vector::Zero(), Vector::Zero());
+        read(from.x, at);
+        const auto& system = step_.system();
+        for (int c = 0; c < system.contacts; ++c) {
+            if (!rests(c, at)) continue;
+            const double bend = change_of_rate(c, from.mode, at, 0, 1e-5 * h);
+            const double later = change_of_rate(c, from.mode, at, h / 2, h);
+            if (std::fabs(bend) <= 1e-6 && later < -1e-9) return true;
+        }
+        return false;
+    }
     [[nodiscard]] bool is_free(double t, const double* x) const override
     {
         if (!to_.impulse.isZero(0)) return false;
@@ -169,6 +185,30 @@ public:
     }
 
 private:
+    /// Whether a contact is closed and at rest, up to rounding.
+    [[nodiscard]] bool rests(int c, const State& at) const
+    {
+        constexpr double rounding = 64 * std::numeric_limits<double>::epsilon();
+        const auto is_zero = [](double value, const Vector& terms) {
+            return std::fabs(value) <= rounding * terms.template lpNorm<Eigen::Infinity>();
+        };
+        return is_zero(step_.system().gap(c, at.t, at.q), at.q) &&
+               is_zero(step_.system().gap_rate(c, at.t, at.q, at.v), at.v);
+    }
+    /// Change of the rate of a gap in s [s] of a motion with the free acceleration `lag` [s] after
+    /// its start, in parts of the change of the velocity.
+    [[nodiscard]] double change_of_rate(int c, Mode mode, const State& at, double lag,
+                                        double s) const
+    {
+        const auto& system = step_.system();
+        Vector a;
+        system.acceleration({mode, at.t + lag}, at.q + lag * at.v, at.v, a);
+        const Vector v = at.v + s * a, q = at.q + (s / 2) * (at.v + v);
+        const double size = s * a.template lpNorm<Eigen::Infinity>();
+        const double change =
+            system.gap_rate(c, at.t + s, q, v) - system.gap_rate(c, at.t, at.q, at.v);
+        return size > 0 ? change / size : 0;
+    }
     static void read(const double* x, State& to)
     {
         to.q = Eigen::Map<const Vector>(x);
