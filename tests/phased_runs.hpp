@@ -13,6 +13,9 @@
 
 #include "ricochet/ricochet.hpp"
 #include "sliding_systems.hpp"
+#ifdef RICOCHET_TESTS_IN_C
+#include "c_runs.hpp"
+#endif
 
 namespace ricochet {
 
@@ -39,7 +42,8 @@ template <class System, class X>
     return simulation->x();
 }
 
-/// Integrates through all adapters, which have to agree, and returns the run of `integrate`.
+/// Integrates through all adapters, that for C among them, which have to agree, and returns the run
+/// of `integrate`.
 template <class System, class X>
 [[nodiscard]] auto run_of(const System& system, const X& x0, const Options& options)
 {
@@ -52,6 +56,11 @@ template <class System, class X>
         EXPECT_NEAR(run.x[i], whole.x()[i], exact_motion) << i;
     }
     EXPECT_EQ(run.outcome, whole.run().outcome);
+#ifdef RICOCHET_TESTS_IN_C
+    if constexpr (SystemInC<System, X>::fits) {
+        expect_same_in_c(system, x0, options, run, exact_motion);
+    }
+#endif
     return run;
 }
 

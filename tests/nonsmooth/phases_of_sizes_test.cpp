@@ -99,7 +99,7 @@ struct Pair {
 
 TEST(PhasesOfSizes, AResetThatRoundingMovesOffZeroLeavesThePairHeld)
 {
-    const auto run = integrate(Pair{}, {1, 0}, until(3));
+    const auto run = run_of(Pair{}, Pair::State{1, 0}, until(3));
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     const auto sticks = times_of(run.events, EventKind::stick);
     ASSERT_EQ(sticks.size(), 1U);
@@ -164,7 +164,7 @@ TEST(PhasesOfSizes, AVetoOfAnImpactOutlastsAStick)
                              },
                          .own = {{bounding(), [](double, const X& x) { return x[1]; },
                                   [](double, X& x) { x[2] = -x[2]; }}}}};
-    const auto run = integrate(system, {2, 1.125, 0}, until(3));
+    const auto run = run_of(system, X{2, 1.125, 0}, until(3));
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     const auto sticks = times_of(run.events, EventKind::stick);
     ASSERT_EQ(sticks.size(), 1U);
@@ -176,7 +176,7 @@ TEST(PhasesOfSizes, AVetoOfAnImpactOutlastsAStick)
 // until its error is within the tolerance, and no step is longer than 6e-3.
 TEST(PhasesOfSizes, ReactionsOfTheSameMotionAreFollowedByImplicitSteps)
 {
-    const auto run = integrate(TwoContacts{}, {0.0}, until(6));
+    const auto run = run_of(TwoContacts{}, TwoContacts::State{0}, until(6));
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_NEAR(run.x[0], 2, 1e-5);
     ASSERT_EQ(run.phases.size(), 2U);

@@ -84,7 +84,7 @@ template <class Events>
 TEST(Phases, ABallMeetsItsFloorWhileABlockIsHeld)
 {
     const Slider<3> system{.f = fall, .own = {elastic_floor()}};
-    const auto run = integrate(system, {1, 1.125, 0}, until(3));
+    const auto run = run_of(system, Three{1, 1.125, 0}, until(3));
     expect_end(run, Three{0, 1.125, 0});
     expect_times(times_of(run.events, 1), {1.5});
     expect_times(times_of(run.events, EventKind::stick), {1});
@@ -96,7 +96,7 @@ TEST(Phases, ABallMeetsItsFloorWhileABlockIsHeld)
 TEST(Phases, ARecordedSectionIsCrossedMeanwhile)
 {
     const Slider<3> system{.f = fall, .own = {section_at(0.5)}};
-    const auto run = integrate(system, {1, 1.125, 0}, until(3));
+    const auto run = run_of(system, Three{1, 1.125, 0}, until(3));
     expect_times(times_of(run.events, 1), {std::sqrt(1.25)});
 }
 
@@ -104,7 +104,7 @@ TEST(Phases, FloorSectionAndTimeEventsAllHappenMeanwhile)
 {
     const Slider<3> system{
         .f = fall, .own = {elastic_floor(), section_at(0.5)}, .next = every(0.75)};
-    const auto run = integrate(system, {1, 1.125, 0}, until(3));
+    const auto run = run_of(system, Three{1, 1.125, 0}, until(3));
     const double down = std::sqrt(1.25);
     expect_end(run, Three{0, 1.125, 0});
     expect_times(times_of(run.events, 1), {1.5});
@@ -116,7 +116,7 @@ TEST(Phases, ALoadHoldsAndReleases)
 {
     // v' = t - 3 from 1/2 stops at 3 - sqrt 8; held until the load is 3; then v = (t - 3)^2 / 2.
     const Slider<3> system{.f = fall_under_load, .friction = 3, .own = {elastic_floor()}};
-    const auto run = integrate(system, {0.5, 1.125, 0}, until(6));
+    const auto run = run_of(system, Three{0.5, 1.125, 0}, until(6));
     expect_end(run, Three{4.5, 1.125, 0}, 1e-8);
     expect_times(times_of(run.events, 1), {1.5, 4.5});
     expect_times(times_of(run.events, EventKind::stick), {3 - std::sqrt(8.0)});
@@ -130,7 +130,7 @@ TEST(Phases, AChangingLoadIsFollowedThroughSticksAndSlips)
                                    dxdt = {1.25 * std::sin(t), x[2], -1};
                                },
                            .own = {elastic_floor()}};
-    const auto run = integrate(system, {0, 1.125, 0}, until(12));
+    const auto run = run_of(system, Three{0, 1.125, 0}, until(12));
     expect_times(times_of(run.events, 1), {1.5, 4.5, 7.5, 10.5}, 1e-8);
     const auto slips = times_of(run.events, EventKind::slip);
     ASSERT_FALSE(slips.empty());
@@ -142,7 +142,7 @@ TEST(Phases, AChangingLoadIsFollowedThroughSticksAndSlips)
 TEST(Phases, ASlipAndAnImpactAtOneInstantBothHappen)
 {
     const Slider<3> system{.f = fall_under_load, .friction = 2, .own = {elastic_floor()}};
-    const auto run = integrate(system, {0, 2, 0}, until(3));
+    const auto run = run_of(system, Three{0, 2, 0}, until(3));
     expect_end(run, Three{0.5, 1.5, 1});
     expect_times(times_of(run.events, 1), {2});
     expect_times(times_of(run.events, EventKind::slip), {2});
@@ -151,7 +151,7 @@ TEST(Phases, ASlipAndAnImpactAtOneInstantBothHappen)
 TEST(Phases, AStickAndAnImpactAtOneInstantBothHappen)
 {
     const Slider<3> system{.f = fall, .own = {elastic_floor()}};
-    const auto run = integrate(system, {1, 0.5, 0}, until(2));
+    const auto run = run_of(system, Three{1, 0.5, 0}, until(2));
     expect_end(run, Three{0, 0.5, 0});
     expect_times(times_of(run.events, 1), {1});
     expect_times(times_of(run.events, EventKind::stick), {1});
@@ -161,7 +161,7 @@ TEST(Phases, ASlipAnImpactAndATimeEventAtOneInstantAllHappen)
 {
     const Slider<3> system{
         .f = fall_under_load, .friction = 2, .own = {elastic_floor()}, .next = once(2)};
-    const auto run = integrate(system, {0, 2, 0}, until(3));
+    const auto run = run_of(system, Three{0, 2, 0}, until(3));
     expect_end(run, Three{0.5, 1.5, 1});
     expect_times(times_of(run.events, 1), {2});
     expect_times(times_of(run.events, EventKind::time), {2});
@@ -173,7 +173,7 @@ TEST(Phases, ATimeEventKicksTheHeldBlock)
         .f = fall, .own = {elastic_floor()}, .next = once(2), .kick = [](double, Three& x) {
             x[0] = 0.5;
         }};
-    const auto run = integrate(system, {1, 1.125, 0}, until(4));
+    const auto run = run_of(system, Three{1, 1.125, 0}, until(4));
     expect_end(run, Three{0, 0.625, -1});
     expect_times(times_of(run.events, 1), {1.5});
     expect_times(times_of(run.events, EventKind::stick), {1, 2.5});
@@ -199,7 +199,7 @@ TEST(Phases, ATimeEventAtWhichTheFrictionDropsReleasesTheBlock)
         [[nodiscard]] Dropping set_valued() const { return {{this}}; }
     };
     const Drops system{{.f = [](double, const One&, One& dxdt) { dxdt[0] = 1; }, .next = once(1)}};
-    const auto run = integrate(system, {0}, until(2));
+    const auto run = run_of(system, One{0}, until(2));
     expect_end(run, One{0.5});
     expect_times(times_of(run.events, EventKind::time), {1});
     expect_times(times_of(run.events, EventKind::slip), {1});
@@ -224,7 +224,7 @@ void carry(double, const Two& x, Two& dxdt)
 
 TEST(Phases, ABeltCarriesABlockIntoAWallAgainAndAgain)
 {
-    const auto run = integrate(belt_and_wall(), {0.5, 0}, until(10));
+    const auto run = run_of(belt_and_wall(), Two{0.5, 0}, until(10));
     expect_end(run, Two{-0.5625, 0.876953125});
     std::vector<double> impacts;
     for (int k = 0; k < 6; ++k) impacts.push_back(2 + 1.5625 * k);
@@ -239,7 +239,7 @@ TEST(Phases, ABeltCarriesABlockAcrossASection)
     const Slider<2> system{.f = carry,
                            .belt = 0.5,
                            .own = {{recorded(), [](double, const Two& x) { return x[1] - 0.7; }}}};
-    const auto run = integrate(system, {0, 0}, until(4));
+    const auto run = run_of(system, Two{0, 0}, until(4));
     expect_times(times_of(run.events, 1), {0.5 + 0.575 / 0.5});
 }
 
@@ -260,21 +260,21 @@ TEST(Phases, ABeltCarriesABlockAcrossASection)
 
 TEST(Phases, ABallStrikesTheHeldBlock)
 {
-    const auto run = integrate(struck_by_a_ball(1), {0, 1, 1}, until(3));
+    const auto run = run_of(struck_by_a_ball(1), Three{0, 1, 1}, until(3));
     expect_end(run, Three{0, 0.5, 0});
     expect_times(times_of(run.events, 1), {1});
 }
 
 TEST(Phases, ABallStrikesTheBlockThatSlidesTowardsIt)
 {
-    const auto run = integrate(struck_by_a_ball(1), {-0.5, 1, 1}, until(3));
+    const auto run = run_of(struck_by_a_ball(1), Three{-0.5, 1, 1}, until(3));
     expect_end(run, Three{0, 0.5, 0});
     expect_times(times_of(run.events, 1), {0.875});
 }
 
 TEST(Phases, ABallStrikesTheHeldBlockInelastically)
 {
-    const auto run = integrate(struck_by_a_ball(0.75), {0, 1, 1}, until(1.7));
+    const auto run = run_of(struck_by_a_ball(0.75), Three{0, 1, 1}, until(1.7));
     expect_end(run, Three{0.05, 0.75 * 0.7 - 0.245 - 0.25 * 0.7, 0.25});
 }
 
@@ -288,7 +288,7 @@ TEST(Phases, AnOscillatorWithFrictionMeetsAStop)
                            .friction = 0.3,
                            .own = {{bounding(), [](double, const Two& x) { return x[1] + 1.2; },
                                     [](double, Two& x) { x[0] = -x[0]; }}}};
-    const auto run = integrate(system, {0, 2}, until(30));
+    const auto run = run_of(system, Two{0, 2}, until(30));
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     const auto impacts = times_of(run.events, 1);
     ASSERT_FALSE(impacts.empty());
@@ -309,7 +309,7 @@ TEST(Phases, AGuardOfTimeAloneCountsOnASlidingMode)
     const Slider<1> system{.f = swing,
                            .friction = 2,
                            .own = {{recorded(), [](double t, const One&) { return t - 0.25; }}}};
-    const auto run = integrate(system, {0.15}, until(0.5));
+    const auto run = run_of(system, One{0.15}, until(0.5));
     expect_end(run, One{0}, 0);
     expect_times(times_of(run.events, 1), {0.25}, 1e-12);
 }
@@ -318,7 +318,7 @@ TEST(Phases, ATimeEventThrowsTheStateOffASlidingMode)
 {
     const Slider<1> system{
         .f = swing, .friction = 2, .next = once(0.3), .kick = [](double, One& x) { x[0] = 0.05; }};
-    const auto run = integrate(system, {0.15}, until(0.31));
+    const auto run = run_of(system, One{0.15}, until(0.31));
     const double x = 0.05 - 2 * 0.01 + 0.035 * (std::cos(15.0) - std::cos(15.5));
     expect_end(run, One{x});
 }
@@ -333,7 +333,7 @@ TEST(Phases, ATimeEventThrowsTheStateOffASlidingMode)
 TEST(Phases, TheInclusionDecidesAtTheStart)
 {
     const auto end_of = [](const Slider<1>& system, double t_end) {
-        return integrate(system, {0}, until(t_end));
+        return run_of(system, One{0}, until(t_end));
     };
     expect_end(end_of(loaded([](double) { return 1; }), 2), One{0}, 0);
     expect_end(end_of(loaded([](double t) { return 1 + t; }), 2), One{2});
@@ -352,7 +352,7 @@ TEST(Phases, AShortStickIsNotPassedOver)
     // w' = 2 t - 2 from 1 - d: sticks where t^2 - 2 t + 1 = d, slips at 1.
     const Slider<1> system = loaded([](double t) { return 2 * t - 1; });
     const double d = 1e-5;
-    const auto run = integrate(system, {1 - d}, until(2));
+    const auto run = run_of(system, One{1 - d}, until(2));
     expect_end(run, One{1});
     expect_times(times_of(run.events, EventKind::stick), {1 - std::sqrt(d)}, 1e-8);
     expect_times(times_of(run.events, EventKind::slip), {1});
@@ -361,7 +361,7 @@ TEST(Phases, AShortStickIsNotPassedOver)
 TEST(Phases, AMotionThroughZeroIsOneEvent)
 {
     // w' = -3 above zero, -1 below.
-    const auto run = integrate(loaded([](double) { return -2; }), {1}, until(1));
+    const auto run = run_of(loaded([](double) { return -2; }), One{1}, until(1));
     expect_end(run, One{-2.0 / 3});
     ASSERT_EQ(run.events.size(), 1U);
     EXPECT_EQ(run.events[0].kind, EventKind::mode);
@@ -375,9 +375,9 @@ TEST(Phases, TimeEventsThatDoNothingLeaveTheMotion)
     // w' = t - 3 from 1/2 as above; the load is t.
     Slider<1> system = loaded([](double t) { return t; });
     system.friction = 3;
-    const auto plain = integrate(system, {0.5}, until(6));
+    const auto plain = run_of(system, One{0.5}, until(6));
     system.next = every(0.1);
-    const auto ticking = integrate(system, {0.5}, until(6));
+    const auto ticking = run_of(system, One{0.5}, until(6));
     expect_end(plain, One{4.5});
     expect_end(ticking, One{4.5});
     expect_times(times_of(ticking.events, EventKind::stick), {3 - std::sqrt(8.0)});
@@ -385,11 +385,22 @@ TEST(Phases, TimeEventsThatDoNothingLeaveTheMotion)
     EXPECT_EQ(times_of(ticking.events, EventKind::time).size(), 60U);
 }
 
+TEST(Phases, ALoadThatIsGoneAtATimeEventReleasesNothing)
+{
+    // It reaches the bound at the tick at which it ends.
+    Slider<1> system = loaded([](double t) { return t < 1 ? t : 0; });
+    system.next = once(1);
+    const auto run = run_of(system, One{0}, until(2));
+    expect_end(run, One{0}, 0);
+    ASSERT_EQ(run.events.size(), 1U);
+    EXPECT_EQ(run.events[0].kind, EventKind::time);
+}
+
 TEST(Phases, AStickIsOneEventWhateverGuardsStandForIt)
 {
     Slider<1> system = loaded([](double) { return 0; });
     system.own = {{recorded(), [](double, const One& x) { return 3 * x[0]; }}};
-    const auto run = integrate(system, {1}, until(2));
+    const auto run = run_of(system, One{1}, until(2));
     expect_end(run, One{0}, 0);
     ASSERT_EQ(run.events.size(), 1U);
     EXPECT_EQ(run.events[0].kind, EventKind::stick);
@@ -408,6 +419,7 @@ TEST(Phases, AResetThatOnlyCountsIsAskedOnce)
     const auto run = integrate(system, {1}, until(2));
     expect_end(run, One{0}, 0);
     EXPECT_EQ(calls, 1);
+    expect_end(run_of(system, One{1}, until(2)), One{0}, 0);
 }
 
 // --- what has nothing to do with the inclusion ---
@@ -458,7 +470,7 @@ TEST(Phases, StopAfterCountsWhileABlockIsHeld)
     OwnGuard<3> floor = elastic_floor();
     floor.info.stop_after = 2;
     const Slider<3> system{.f = fall, .own = {floor}};
-    const auto run = integrate(system, {1, 1.125, 0}, until(6));
+    const auto run = run_of(system, Three{1, 1.125, 0}, until(6));
     EXPECT_EQ(run.outcome, Outcome::stopped_by_event);
     EXPECT_EQ(run.guard, 1U);
     EXPECT_NEAR(run.t, 4.5, tolerance);
@@ -469,7 +481,7 @@ TEST(Phases, StopAtEventStopsAtASlip)
     Options options = until(6);
     options.stop_at_event = true;
     Slider<1> system = loaded([](double t) { return t; });
-    const auto run = integrate(system, {0}, options);
+    const auto run = run_of(system, One{0}, options);
     EXPECT_EQ(run.outcome, Outcome::stopped_by_event);
     EXPECT_NEAR(run.t, 1, tolerance);
     ASSERT_EQ(run.events.size(), 1U);
@@ -482,7 +494,7 @@ TEST(Phases, SamplesAreThoseOfTheWholeMotion)
     options.sample_times = {0.5, 1.25, 1.5, 2.5};
     options.record_steps = true;
     const Slider<3> system{.f = fall, .own = {elastic_floor()}};
-    const auto run = integrate(system, {1, 1.125, 0}, options);
+    const auto run = run_of(system, Three{1, 1.125, 0}, options);
     ASSERT_EQ(run.trajectory.x.size(), 4U);
     EXPECT_NEAR(run.trajectory.x[0][0], 0.5, tolerance);
     EXPECT_NEAR(run.trajectory.x[1][1], 1.125 - 0.78125, tolerance);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <random>
 #include <span>
 #include <vector>
@@ -54,10 +55,22 @@ struct Walled {
     }
 };
 
+/// Also by steps, with a new simulation after every tenth, which has to end in the same state.
 template <class Fields, class X>
 Run<X> run(const Filippov<Fields>& system, const X& x0, double t_end)
 {
-    return integrate(system, x0, tight(t_end, system.start_mode(0, x0)));
+    const Options options = tight(t_end, system.start_mode(0, x0));
+    auto steps = std::make_unique<Simulation<Filippov<Fields>, X>>(system, x0, options);
+    for (int k = 1; steps->step(); ++k) {
+        if (k % 10 != 0) continue;
+        const Snapshot saved = steps->save();
+        steps = std::make_unique<Simulation<Filippov<Fields>, X>>(system, x0, options);
+        steps->restore(saved);
+    }
+    Run<X> out = integrate(system, x0, options);
+    EXPECT_EQ(steps->run().outcome, out.outcome);
+    for (std::size_t i = 0; i < x0.size(); ++i) EXPECT_NEAR(steps->x()[i], out.x[i], 1e-12);
+    return out;
 }
 
 // It slides to the wall, is lifted off its surface, lands a quarter later, and so on.
