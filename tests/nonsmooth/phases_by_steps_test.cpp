@@ -424,18 +424,18 @@ template <class System, class X>
 
 TEST(PhasesBySteps, FixedStepsStopBlocksBetweenTheirEnds)
 {
-    // As above, with stops inside of steps; the load is constant then.
+    // As above, with stops inside of steps, and before the load begins.
     constexpr std::size_t count = 6;
     Blocks::State x0(count + 2);
     for (std::size_t i = 0; i < count; ++i) x0[i] = 0.0977 * static_cast<double>(i + 1);
     x0[count] = 1.125;
     const Blocks blocks{count};
-    Options options{.t_end = 3};
+    Options options{.t_end = 1.9};
     options.sample_times = {0.35, 1.9};
     const auto run = fixed_run(blocks, x0, options);
-    Blocks::State expected(count + 2, 0.5);
-    expected[count] = 1.125;
-    expected[count + 1] = 0;
+    Blocks::State expected(count + 2, 0);
+    expected[count] = 1.5 * 0.4 - 0.4 * 0.4 / 2;  // the ball, from 1.5 on upwards with 1.5
+    expected[count + 1] = 1.1;
     expect_end(run, expected);
     EXPECT_FALSE(run.phases[0].set_valued);
     ASSERT_EQ(run.trajectory.x.size(), 2U);
