@@ -82,6 +82,41 @@ void describe_islands(const World& world, fmt::memory_buffer& out)
     }
 }
 
+struct GroupCounts {
+    std::size_t asleep = 0, alone = 0;  ///< bodies that are groups of their own
+    double pairs = 0;                   ///< within groups
+};
+
+GroupCounts describe_groups(const World& world, fmt::memory_buffer& out)
+{
+    const auto groups = groups_of(world);
+    const auto to = std::back_inserter(out);
+    GroupCounts counts;
+    std::size_t lines = 0;
+    for (std::size_t number = 0; number < groups.size(); ++number) {
+        const auto group = groups[number];
+        const auto size = static_cast<double>(group.size());
+        counts.pairs += 0.5 * size * (size - 1);
+        const bool sleeps = group.size() == 1 && world.bodies[group[0]].asleep;
+        counts.asleep += sleeps;
+        counts.alone += group.size() == 1 && !sleeps;
+        if (sleeps || ++lines > most_lines) continue;
+        if (group.size() == 1) {
+            fmt::format_to(to, "  {}   {}; meets no other body: runs alone, no calendar\n",
+                           names(world, group), motion_of(world, group));
+            continue;
+        }
+        const auto awake = static_cast<std::size_t>(
+            std::ranges::count_if(group, [&](std::uint32_t i) { return !world.bodies[i].asleep; }));
+        fmt::format_to(to, "  {}   {} of {} awake, may meet before t_end: calendar, cells{}\n",
+                       names(world, group), awake, group.size(), first_meeting(world, group));
+    }
+    if (lines > most_lines) {
+        fmt::format_to(to, "  and {} more groups\n", lines - most_lines);
+    }
+    return counts;
+}
+
 }  // namespace
 
 std::string explain(const Scene& scene, const SceneOptions& options)
@@ -107,38 +142,14 @@ std::string explain(const Scene& scene, const SceneOptions& options)
                        plural(world.motions.size(), "moving face"), one ? "it" : "them",
                        one ? "its" : "their");
     }
-    const auto groups = groups_of(world);
-    std::size_t asleep = 0;
-    std::size_t alone = 0;
-    double pairs = 0;
-    std::size_t lines = 0;
-    for (std::size_t number = 0; number < groups.size(); ++number) {
-        const auto group = groups[number];
-        const auto size = static_cast<double>(group.size());
-        pairs += 0.5 * size * (size - 1);
-        const bool sleeps = group.size() == 1 && world.bodies[group[0]].asleep;
-        asleep += sleeps;
-        alone += group.size() == 1 && !sleeps;
-        if (sleeps || ++lines > most_lines) continue;
-        if (group.size() == 1) {
-            fmt::format_to(to, "  {}   {}; meets no other body: runs alone, no calendar\n",
-                           names(world, group), motion_of(world, group));
-            continue;
-        }
-        const auto awake = static_cast<std::size_t>(
-            std::ranges::count_if(group, [&](std::uint32_t i) { return !world.bodies[i].asleep; }));
-        fmt::format_to(to, "  {}   {} of {} awake, may meet before t_end: calendar, cells{}\n",
-                       names(world, group), awake, group.size(), first_meeting(world, group));
-    }
-    if (lines > most_lines) {
-        fmt::format_to(to, "  and {} more groups\n", lines - most_lines);
-    }
+    const GroupCounts counts = describe_groups(world, out);
     const double all = 0.5 * static_cast<double>(n) * (static_cast<double>(n) - 1);
-    fmt::format_to(to, "asleep      {}, until touched; no event of theirs is expected\n",
-                   n == 1 ? plural(asleep, "body") : fmt::format("{} bodies alone", asleep));
+    fmt::format_to(
+        to, "asleep      {}, until touched; no event of theirs is expected\n",
+        n == 1 ? plural(counts.asleep, "body") : fmt::format("{} bodies alone", counts.asleep));
     fmt::format_to(to, "skipped     {:.0f} of {:.0f} pairs: out of reach before t_end\n",
-                   all - pairs, all);
-    fmt::format_to(to, "alone       {} awake, no calendar\n", alone);
+                   all - counts.pairs, all);
+    fmt::format_to(to, "alone       {} awake, no calendar\n", counts.alone);
     fmt::format_to(
         to, "impacts     {}; {}\n",
         options.impacts == ImpactLaw::waves ? "in waves" : "all of a cluster together",

@@ -32,24 +32,11 @@ Interval swept(double x, double v, double a, double until)
 
 constexpr double infinite = never;
 
-/// Where gravity is perpendicular to the walls that a body can meet, their impacts do not change
-/// its motion along them, so both motions are known.
-bool along_walls(const World& world, const Body& body, double until, Reach& reach)
+/// Range of a body across walls, of normals `normal` and -`normal`.
+Interval between_walls(const World& world, const Body& body, const Vector2& normal, double pull,
+                       double until)
 {
-    const Vector2 normal = world.wall_count > 0 ? world.faces[0].normal : Vector2{0, 1};
-    const Vector2 along = turned(normal);
-    if (normal[0] * normal[1] != 0) return false;  // boxes follow the axes
-    for (std::uint32_t f = 0; f < world.wall_count; ++f) {
-        const Face& wall = world.faces[f];
-        if (std::fabs(dot(wall.normal, along)) > 0) return false;
-        if (world.friction(body.material, wall.material) > 0 && dot(body.v, along) != 0) {
-            return false;
-        }
-    }
-    const double pull = dot(world.gravity, normal);
-    // Drag may turn a body back earlier, so that it comes to places out of reach without drag.
     const bool slowed = body.island != none;
-    if (slowed && dot(world.gravity, along) != 0) return false;
     const double height = dot(body.p, normal);
     const double rise = dot(body.v, normal);
     Interval across = swept(height, rise, pull, until);
@@ -58,6 +45,7 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
         const double top = height - rise * rise / (2 * pull);
         (pull < 0 ? across.high : across.low) =
             pull < 0 ? std::max(across.high, top) : std::min(across.low, top);
+        // Drag may turn a body back earlier, so that it comes to places out of reach without it.
         const double fallen = height + (slowed ? 0.5 * pull * until * until : 0);
         across = {std::min(across.low, fallen), std::max(across.high, fallen)};
     } else if (rise != 0) {
@@ -85,6 +73,26 @@ bool along_walls(const World& world, const Body& body, double until, Reach& reac
             across.high = std::min(across.high, at);
         }
     }
+    return across;
+}
+
+/// Where gravity is perpendicular to the walls that a body can meet, their impacts do not change
+/// its motion along them, so both motions are known.
+bool along_walls(const World& world, const Body& body, double until, Reach& reach)
+{
+    const Vector2 normal = world.wall_count > 0 ? world.faces[0].normal : Vector2{0, 1};
+    const Vector2 along = turned(normal);
+    if (normal[0] * normal[1] != 0) return false;  // boxes follow the axes
+    for (std::uint32_t f = 0; f < world.wall_count; ++f) {
+        const Face& wall = world.faces[f];
+        if (std::fabs(dot(wall.normal, along)) > 0) return false;
+        if (world.friction(body.material, wall.material) > 0 && dot(body.v, along) != 0) {
+            return false;
+        }
+    }
+    const double pull = dot(world.gravity, normal);
+    if (body.island != none && dot(world.gravity, along) != 0) return false;
+    const Interval across = between_walls(world, body, normal, pull, until);
     const Interval sideways =
         swept(dot(body.p, along), dot(body.v, along), dot(world.gravity, along), until);
     for (std::size_t c = 0; c < 2; ++c) {

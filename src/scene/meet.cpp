@@ -274,6 +274,119 @@ static bool lands_on(const World& world, const Body& body, std::uint32_t which, 
     return world.holds(face, p, flown) && !world.passes_end(body, which, above, p, v, flown);
 }
 
+namespace {
+
+/// A body on its way to the line of a wall or of a segment.
+struct TowardsLine {
+    const World& world;
+    std::uint32_t i, which;
+    bool segment, above;
+    Vector2 normal;          ///< towards the body
+    double rounding;         ///< of the gap
+    bool on;                 ///< whether it starts beside the wall or the segment itself
+    double gap, rate, bend;  ///< of degree 0, 1 and 2, from the start of its record on
+
+    [[nodiscard]] const Body& body() const { return world.bodies[i]; }
+    [[nodiscard]] const Face& face() const { return world.faces[which]; }
+    /// Beside the end of a segment a disc may reach across its line: it meets the segment after it
+    /// has left the line and comes back.
+    [[nodiscard]] bool beside() const { return gap < -rounding && !on; }
+    /// A body on the line beside a segment reaches its end a little later.
+    [[nodiscard]] double closed() const { return on ? rounding : 0; }
+    /// Whether it meets the wall or segment after s seconds. On the method's own map, as the line
+    /// is met: the polynomial of a step passes both segments of a corner by its error.
+    [[nodiscard]] bool lands(double s, bool side) const
+    {
+        if (!segment || !std::isfinite(s)) return true;
+        const Instant t = body().t.after(s);
+        return lands_on(world, body(), which, side, world.position(i, t), world.velocity(i, t),
+                        rounding_of_flight(body(), s));
+    }
+    [[nodiscard]] Polynomial polynomial(const Path& path) const
+    {
+        return {gap, rate, bend, dot(path.c[3], normal), dot(path.c[4], normal)};
+    }
+    [[nodiscard]] double located(double after, double side, const Path& path) const;
+};
+
+/// The time near `after` at which it meets the line, from the given side of it, on its own map.
+double TowardsLine::located(double after, double side, const Path& path) const
+{
+    const Polynomial c = polynomial(path);
+    const Body& b = body();
+    const Departure from = side > 0 && on ? departure(gap, rounding) : Departure{};
+    const auto at = [&](double s) {
+        const Instant t = b.t.after(s);
+        const Vector2 facing = side * normal;
+        return GapAndRate{from.left_of(dot(world.position(i, t) - face().at, facing) - b.radius),
+                          dot(world.velocity(i, t), facing)};
+    };
+    return on_map(after, path.until, at,
+                  [&](double s) { return side * (2 * c[2] + s * (6 * c[3] + 12 * s * c[4])); });
+}
+
+/// First contact on a straight line or a parabola.
+[[gnu::always_inline]] inline Meeting meet_line_in_flight(const TowardsLine& line, const Path& path,
+                                                          double rate)
+{
+    Meeting meeting{.from = line.body().t};
+    const double bend = line.bend;
+    const bool beside = line.beside();
+    meeting.after = beside ? falls_again(line.polynomial(path), path.degree, path.until)
+                           : falls_after(line.gap, rate, 2 * bend, line.closed());
+    if (!(beside && meeting.after == never) && line.lands(meeting.after, line.above)) {
+        return meeting;
+    }
+    if (bend <= 0 || rate >= 0) return {};
+    // The body passes the end of the segment, and comes back from behind.
+    const double behind = -(line.gap + 2 * line.body().radius);
+    const double square = rate * rate + 4 * bend * behind;
+    if (!(square > 0)) return {};
+    meeting.after = (std::sqrt(square) - rate) / (2 * bend);
+    return line.lands(meeting.after, !line.above) ? meeting : Meeting{};
+}
+
+/// First contact in a step that passes an end of the segment at `first`, and may come back, from
+/// either side.
+Meeting meet_line_again(const TowardsLine& line, const Path& path, double first)
+{
+    Meeting meeting{.from = line.body().t, .after = never};
+    Polynomial front = line.polynomial(path);
+    if (!line.beside() && line.gap <= line.closed()) front[0] = 0;
+    Polynomial behind{};
+    for (std::size_t k = 0; k < 5; ++k) behind[k] = -front[k];
+    behind[0] -= 2 * line.body().radius;
+    const double past = first < never ? (1 + 1e-9) * first : 0;
+    for (const double side : {1.0, -1.0}) {
+        for (const double s : falls_in(side > 0 ? front : behind, 4, path.until)) {
+            if (!(s < meeting.after)) break;
+            if (side > 0 && s <= past) continue;
+            const double after = line.located(s, side, path);
+            if (!line.lands(after, side > 0 ? line.above : !line.above)) continue;
+            meeting.after = after;
+            break;
+        }
+    }
+    return meeting.after < never ? meeting : Meeting{};
+}
+
+/// First contact in a step of an island.
+Meeting meet_line_in_step(const TowardsLine& line, const Path& path)
+{
+    Meeting meeting{.from = line.body().t};
+    if (line.gap > reach_of(path)) return meeting;
+    const Polynomial c = line.polynomial(path);
+    const bool beside = line.beside();
+    const double first =
+        beside ? falls_again(c, 4, path.until) : falls_within(c, 4, path.until, line.closed());
+    meeting.after = first > 0 && std::isfinite(first) ? line.located(first, 1, path) : first;
+    if (!line.segment || (!beside && first == never)) return meeting;
+    if (first < never && line.lands(meeting.after, line.above)) return meeting;
+    return meet_line_again(line, path, first);
+}
+
+}  // namespace
+
 /// First contact with a wall, or with the inside of a segment.
 static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t which)
 {
@@ -285,80 +398,19 @@ static Meeting meet_line(const World& world, std::uint32_t i, std::uint32_t whic
     const Vector2 normal = above ? face.normal : -1.0 * face.normal;
     const double gap = dot(path.c[0] - face.at, normal) - b.radius;
     const double rounding = World::rounding(path.c[0], b.radius) + World::blur(face, b.radius);
-    // A body on the line beside a segment reaches its end a little later.
     const bool on = !segment || lies_on(face, path.c[0], slack_of(face, b.radius, path.c[0]));
-    const double closed = on ? rounding : 0;
     double rate = dot(path.c[1], normal);
     const double bend = dot(path.c[2], normal);
-    // On the method's own map, as the line is met: the polynomial of a step passes both segments of
-    // a corner by its error.
-    const auto lands = [&](double s, bool side) {
-        if (!segment || !std::isfinite(s)) return true;
-        const Instant t = b.t.after(s);
-        return lands_on(world, b, which, side, world.position(i, t), world.velocity(i, t),
-                        rounding_of_flight(b, s));
-    };
-    Meeting meeting{.from = b.t};
-    const Polynomial c{gap, rate, bend, dot(path.c[3], normal), dot(path.c[4], normal)};
-    // Beside the end of a segment a disc may reach across its line: it meets the segment after it
-    // has left the line and comes back.
-    const bool beside = gap < -rounding && !on;
+    const TowardsLine line{world, i, which, segment, above, normal, rounding, on, gap, rate, bend};
     if (on && gap <= rounding && std::fabs(rate) <= noise(path.c[1], {})) {
         const Vector2& heading = is_zero(path.c[1]) ? path.c[2] : path.c[1];
         const bool ahead = dot(heading, turned(face.normal)) < 0;
         const bool free = b.radius > 0 || (ahead ? face.next : face.previous) == none;
         if (free && world.leads_off(face, path.c[0], heading)) return {};
-        if (bend < 0 && lands(0, above)) return {.from = b.t, .after = 0, .presses = true};
+        if (bend < 0 && line.lands(0, above)) return {.from = b.t, .after = 0, .presses = true};
         rate = 0;
     }
-    if (path.degree <= 2) {
-        meeting.after = beside ? falls_again(c, path.degree, path.until)
-                               : falls_after(gap, rate, 2 * bend, closed);
-        if (!(beside && meeting.after == never) && lands(meeting.after, above)) return meeting;
-        if (bend <= 0 || rate >= 0) return {};
-        // The body passes the end of the segment, and comes back from behind.
-        const double behind = -(gap + 2 * b.radius);
-        const double square = rate * rate + 4 * bend * behind;
-        if (!(square > 0)) return {};
-        meeting.after = (std::sqrt(square) - rate) / (2 * bend);
-        return lands(meeting.after, !above) ? meeting : Meeting{};
-    }
-    if (gap > reach_of(path)) return meeting;
-    const auto located = [&](double after, double side) {
-        const Departure from = side > 0 && on ? departure(gap, rounding) : Departure{};
-        const auto at = [&](double s) {
-            const Instant t = b.t.after(s);
-            const Vector2 facing = side * normal;
-            return GapAndRate{from.left_of(dot(world.position(i, t) - face.at, facing) - b.radius),
-                              dot(world.velocity(i, t), facing)};
-        };
-        return on_map(after, path.until, at,
-                      [&](double s) { return side * (2 * c[2] + s * (6 * c[3] + 12 * s * c[4])); });
-    };
-    const double first =
-        beside ? falls_again(c, 4, path.until) : falls_within(c, 4, path.until, closed);
-    meeting.after = first > 0 && std::isfinite(first) ? located(first, 1) : first;
-    if (!segment || (!beside && first == never)) return meeting;
-    if (first < never && lands(meeting.after, above)) return meeting;
-    // The body passes an end of the segment, and may come back within the step, from either side.
-    Polynomial front = c;
-    if (!beside && gap <= closed) front[0] = 0;
-    Polynomial behind{};
-    for (std::size_t k = 0; k < 5; ++k) behind[k] = -front[k];
-    behind[0] -= 2 * b.radius;
-    const double past = first < never ? (1 + 1e-9) * first : 0;
-    meeting.after = never;
-    for (const double side : {1.0, -1.0}) {
-        for (const double s : falls_in(side > 0 ? front : behind, 4, path.until)) {
-            if (!(s < meeting.after)) break;
-            if (side > 0 && s <= past) continue;
-            const double after = located(s, side);
-            if (!lands(after, side > 0 ? above : !above)) continue;
-            meeting.after = after;
-            break;
-        }
-    }
-    return meeting.after < never ? meeting : Meeting{};
+    return path.degree <= 2 ? meet_line_in_flight(line, path, rate) : meet_line_in_step(line, path);
 }
 
 namespace {

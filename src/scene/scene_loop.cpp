@@ -55,7 +55,8 @@ void SceneLoop::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEv
     idle_ = 0;
     next_sample_ = 0;
     work_ = {};
-    result_ = {};
+    result_.failure.reset();
+    result_.event_count = 0;
     result_.events = std::move(events);
     shown_ = result_.events.size();
 }

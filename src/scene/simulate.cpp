@@ -110,9 +110,8 @@ SceneRun run_until(const Scene& scene, const SceneOptions& options, const SceneT
     const Instant end = failure ? failure->t : Instant{t_end, 0};
     run.t = end.value;
     reserve_large(run.bodies, world.bodies.size());
-    run.bodies.resize(world.bodies.size());
     for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
-        run.bodies[i] = world.state(i, end);
+        run.bodies.push_back(world.state(i, end));
     }
     for (std::uint32_t i = 0; i < world.turns.size(); ++i) run.turns.push_back(world.turn(i, end));
     for (std::uint32_t k = 0; k < world.islands->count(); ++k) {
