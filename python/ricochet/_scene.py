@@ -296,7 +296,8 @@ class Scene:
 
         Options: ``t_start``, ``sample_times``, ``rtol`` and ``atol`` (of bodies with springs or
         drag), ``impacts`` ("waves", or "together": Newton's law for all contacts of a cluster at once),
-        ``elastic_within`` [s], ``contact_step`` [s] (of groups in lasting contact), ``record_events``,
+        ``elastic_within`` [s], ``contact_step`` [s] (of groups in lasting contact), ``crowded_from``
+        (bodies from which a group may be a crowd, 0: never), ``record_events``,
         ``max_events``, ``seed`` (of thermal walls). ValueError for a scene that cannot start, naming the bodies that overlap.
         """
         return SceneRun(self, self._scene.simulate(self._options(t_end, options)))

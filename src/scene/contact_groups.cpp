@@ -23,12 +23,17 @@ public:
     Plan plan(double longest) override
     {
         const auto [outcome, length] = island_.plan(island_.t() + longest);
-        return {outcome, length, island_.planned_step(), island_.failure().residual,
-                island_.wake_time() - island_.t()};
+        return {outcome,
+                length,
+                island_.planned_step(),
+                island_.failure().residual,
+                island_.wake_time() - island_.t(),
+                island_.rebounds()};
     }
     void commit(double s) override { island_.commit(s); }
     std::array<double, 2> chord(std::uint32_t id) const override { return island_.chord(id); }
     IslandBody body(std::uint32_t id) const override { return island_.body(id); }
+    void set_crowded(bool crowded) override { island_.set_crowded(crowded); }
     void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity) override
     {
         island_.set_velocity(id, velocity);

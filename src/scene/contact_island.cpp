@@ -13,6 +13,22 @@ namespace {
 
 constexpr double epsilon = 2.220446049250313e-16;
 
+/// Defect of the contact law in a crowd, as a fraction of the velocities, and the smaller one where
+/// with the first the energy would rise.
+constexpr double crowded_defect = 1e-4;
+constexpr double crowded_small_defect = 1e-6;
+/// Overlap, as a fraction of the coordinates, that a crowd does not push apart.
+constexpr double crowded_overlap = 1e-8;
+/// Residual of the impacts at the end of its steps.
+constexpr double impact_defect = 1e-2;
+/// Velocity, as a fraction of that of a step of free fall, below which rest of a crowd is looked
+/// for, and the number of steps from one look to the next.
+constexpr double crowded_slow = 1e-2;
+constexpr std::uint32_t steps_to_look = 16;
+
+/// [m/s] Relative velocity at which a contact has no part in impacts.
+constexpr double apart = 1e6;
+
 }  // namespace
 
 // --- the law of one step ---
@@ -65,6 +81,9 @@ LawContact ContactIsland::law_contact(const Touch& touch, double h) const
                  .friction = touch.law.friction};
     // An overlap by rounding is removed in one step; a deeper one is not pushed out at a speed.
     c.offset[0] = std::max(touch.gap, -closed_gap * size_of(touch.body)) / h;
+    if (options_.crowded && touch.gap < 0) {
+        c.offset[0] = std::min(0.0, touch.gap + crowded_overlap * size_of(touch.body)) / h;
+    }
     if (!touch.wall) return c;
     const auto way = wall_displacement(touch.other, t_, t_ + h);
     const auto [nx, ny] = touch.normal;
@@ -117,14 +136,20 @@ bool ContactIsland::solve_touches(double h)
 /// a converged solution is accepted.
 bool ContactIsland::solve_law(double h, bool last_resorts)
 {
-    impulses_ = warm_impulses(h);
-    failure_ = law_.solve(problem_, impulses_, v_next_, last_resorts);
+    if (enough_ == 0 || enough_ == crowded_defect) impulses_ = warm_impulses(h);
+    if (enough_ > 0) {
+        const bool polish = enough_ < crowded_defect;
+        failure_ = law_.settle(problem_, impulses_, v_next_, enough_, polish);
+    }
+    if (enough_ == 0 || failure_.residual > crowded_defect) {
+        failure_ = law_.solve(problem_, impulses_, v_next_, last_resorts);
+    }
     ++statistics_.problems;
     statistics_.iterations += static_cast<std::uint64_t>(failure_.iterations);
     statistics_.factors += static_cast<std::uint64_t>(failure_.factors);
     statistics_.sweeps += static_cast<std::uint64_t>(failure_.sweeps);
     statistics_.dense += failure_.dense;
-    const double most = last_resorts ? options_.largest_defect : 0;
+    const double most = enough_ > 0 ? crowded_defect : last_resorts ? options_.largest_defect : 0;
     const bool solved = failure_.converged || failure_.residual <= most;
     return solved && v_next_.allFinite();
 }
@@ -176,41 +201,151 @@ double ContactIsland::relative_normal(const Touch& touch, const Eigen::VectorXd&
     return nx * x + ny * y;
 }
 
-/// Excludes contacts that would rebound for a step or longer, so that the motion goes on up to
-/// them. A shorter rebound is dissipated: impacts that a step does not resolve accumulate within
-/// it.
-bool ContactIsland::exclude_arrivals(double h)
+/// Change of velocities by forces alone in the current step.
+Eigen::VectorXd ContactIsland::kick() const
 {
     Eigen::VectorXd kick = problem_.momentum;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
         kick.segment<2>(2 * static_cast<Eigen::Index>(i)) /= problem_.inertia[i];
     }
     kick -= v_;
+    return kick;
+}
+
+/// [m/s] Speed at which a contact that closes in a step rebounds, 0 where it does not. A rebound
+/// shorter than the step is dissipated: impacts that a step does not resolve accumulate within it.
+double ContactIsland::rebound_speed(std::size_t k, double h, const Eigen::VectorXd& kick)
+{
+    const Touch& c = touches_[k];
+    if (!(impulses_[2 * static_cast<Eigen::Index>(k)] > 0) || c.law.restitution == 0) return 0;
+    if (c.gap <= closed_gap * size_of(c.body)) return 0;
+    double approach = -relative_normal(c, v_);
+    if (c.wall) {
+        const auto way = wall_displacement(c.other, t_, t_ + h);
+        approach += (c.normal[0] * way[0] + c.normal[1] * way[1]) / h;
+    }
+    const bool lasts = std::ranges::any_of(warm_, [&](const Touch& w) {
+        return same(c, w) && warm_impulses_[2 * static_cast<Eigen::Index>(&w - warm_.data())] > 0;
+    });
+    if (lasts || !(approach > 0)) return 0;
+    // Under gravity any approach as slow as a step of free fall is soon pressed together.
+    const double press =
+        std::max(-relative_normal(c, kick) / h, std::hypot(gravity_[0], gravity_[1]));
+    if (2 * c.law.restitution * approach < press * h) {
+        ++statistics_.spent;
+        return 0;
+    }
+    return c.law.restitution * approach;
+}
+
+/// Excludes contacts that would rebound, so that the motion goes on up to them.
+bool ContactIsland::exclude_arrivals(double h)
+{
+    const Eigen::VectorXd change = kick();
     const std::size_t before = excluded_.size();
     for (std::size_t k = 0; k < touches_.size(); ++k) {
-        const Touch& c = touches_[k];
-        if (!(impulses_[2 * static_cast<Eigen::Index>(k)] > 0) || c.law.restitution == 0) continue;
-        if (c.gap <= closed_gap * size_of(c.body)) continue;
-        double approach = -relative_normal(c, v_);
-        if (c.wall) {
-            const auto way = wall_displacement(c.other, t_, t_ + h);
-            approach += (c.normal[0] * way[0] + c.normal[1] * way[1]) / h;
-        }
-        const bool lasts = std::ranges::any_of(warm_, [&](const Touch& w) {
-            return same(c, w) &&
-                   warm_impulses_[2 * static_cast<Eigen::Index>(&w - warm_.data())] > 0;
-        });
-        if (lasts || !(approach > 0)) continue;
-        // Under gravity any approach as slow as a step of free fall is soon pressed together.
-        const double press =
-            std::max(-relative_normal(c, kick) / h, std::hypot(gravity_[0], gravity_[1]));
-        if (2 * c.law.restitution * approach < press * h) {
-            ++statistics_.spent;
-        } else {
-            excluded_.push_back(c);
-        }
+        if (rebound_speed(k, h, change) > 0) excluded_.push_back(touches_[k]);
     }
     return excluded_.size() > before;
+}
+
+LawContact ContactIsland::closed_contact(const Touch& touch, double h) const
+{
+    Touch closed = touch;
+    closed.gap = 0;
+    return law_contact(closed, h);
+}
+
+/// Sets the impacts at the end of a step of length h of a crowd; false where there are none.
+bool ContactIsland::set_rebounds(double h)
+{
+    const Eigen::VectorXd change = kick();
+    impacts_.contacts.clear();
+    rebounds_ = 0;
+    for (std::size_t k = 0; k < touches_.size(); ++k) {
+        LawContact c = closed_contact(touches_[k], h);
+        const double speed = rebound_speed(k, h, change);
+        rebounds_ += speed > 0;
+        c.offset[0] -= speed;
+        // The others stay apart.
+        if (!(impulses_[2 * static_cast<Eigen::Index>(k)] > 0)) c.offset[0] = apart;
+        impacts_.contacts.push_back(c);
+    }
+    if (rebounds_ == 0) return false;
+    impacts_.inertia.clear();
+    for (const IslandBody& b : bodies_) impacts_.inertia.push_back(b.mass);
+    impacts_.momentum = v_next_;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+        impacts_.momentum.segment<2>(2 * static_cast<Eigen::Index>(i)) *= bodies_[i].mass;
+    }
+    return true;
+}
+
+/// [J] Energy lost in a step of length h, seen from walls that move; that lost by drag and springs
+/// is not counted.
+double ContactIsland::lost(double h) const
+{
+    double lost = 0;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+        const auto k = 2 * static_cast<Eigen::Index>(i);
+        lost += 0.5 * bodies_[i].mass * (v_next_.segment<2>(k) - v_.segment<2>(k)).squaredNorm();
+    }
+    for (std::size_t k = 0; k < touches_.size(); ++k) {
+        const auto i = 2 * static_cast<Eigen::Index>(k);
+        if (!(impulses_[i] > 0)) continue;
+        const auto u = ContactLaw::relative(closed_contact(touches_[k], h), v_next_);
+        lost -= impulses_[i] * u.normal + impulses_[i + 1] * u.tangential;
+    }
+    return lost;
+}
+
+/// The largest part of impulses p, which lead from the velocities of the step's end to v, with
+/// which the energy is not above that at the start of the step.
+double ContactIsland::allowed_part(const Eigen::VectorXd& p, const Eigen::VectorXd& v,
+                                   double h) const
+{
+    double linear = 0;  // gained with the part theta: theta linear + theta^2 square
+    double square = 0;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+        const auto k = 2 * static_cast<Eigen::Index>(i);
+        square += 0.5 * bodies_[i].mass * (v.segment<2>(k) - v_next_.segment<2>(k)).squaredNorm();
+    }
+    for (std::size_t k = 0; k < touches_.size(); ++k) {
+        const auto i = 2 * static_cast<Eigen::Index>(k);
+        if (!(p[i] > 0)) continue;
+        const auto u = ContactLaw::relative(closed_contact(touches_[k], h), v_next_);
+        linear += p[i] * u.normal + p[i + 1] * u.tangential;
+    }
+    const double most = lost(h);
+    if (linear + square <= most) return 1;
+    if (!(most > 0)) return 0;
+    return (std::sqrt(linear * linear + 4 * most * square) - linear) / (2 * square);
+}
+
+/// Lets the contacts that close in a step of length h of a crowd rebound at its end.
+void ContactIsland::rebound(double h)
+{
+    v_end_ = v_next_;
+    if (!set_rebounds(h)) return;
+    Eigen::VectorXd p;
+    Eigen::VectorXd v;
+    impact_law_.settle(impacts_, p, v, impact_defect, false);
+    if (!v.allFinite()) return;
+    v_end_ += allowed_part(p, v, h) * (v - v_next_);
+}
+
+/// A step of a crowd, whose contacts are solved again where the energy would rise by their defect.
+bool ContactIsland::attempt_in_crowd(double h)
+{
+    bool solved = false;
+    for (const double enough : {crowded_defect, crowded_small_defect, 0.0}) {
+        enough_ = enough;
+        solved = attempt(h);
+        if (!solved || failure_.converged || lost(h) >= 0) break;
+    }
+    enough_ = 0;
+    if (solved) rebound(h);
+    return solved;
 }
 
 /// A contact s after the start of the current step.
@@ -301,8 +436,8 @@ bool ContactIsland::fit_step(double h)
     for (int halving = 0; halving <= 10; ++halving) {
         excluded_.clear();
         planned_ = h;
-        bool solved = attempt(h);
-        while (solved && exclude_arrivals(h)) solved = attempt(h);
+        bool solved = options_.crowded ? attempt_in_crowd(h) : attempt(h);
+        while (solved && !options_.crowded && exclude_arrivals(h)) solved = attempt(h);
         if (solved) return true;
         if (!problem_.momentum.allFinite()) return false;
         ++statistics_.halvings;
@@ -370,7 +505,7 @@ void ContactIsland::commit(double s)
     const double free = free_speed();
     q_ += s * v_next_;
     if (whole) {
-        v_ = v_next_;
+        v_ = options_.crowded ? v_end_ : v_next_;
     } else {
         v_ += s / planned_ * (v_next_ - v_);
     }
@@ -483,7 +618,12 @@ void ContactIsland::try_to_sleep(double free_speed)
     double size = 0;
     for (int i = 0; i < static_cast<int>(bodies_.size()); ++i) size = std::max(size, size_of(i));
     const double fastest = v_.lpNorm<Eigen::Infinity>();
-    const double zero = 10 * options_.tolerance * free_speed + 16 * epsilon * size / planned_;
+    double zero = 10 * options_.tolerance * free_speed + 16 * epsilon * size / planned_;
+    if (options_.crowded) {
+        if (++awake_steps_ < steps_to_look) return;
+        awake_steps_ = 0;
+        zero = std::max(zero, crowded_slow * free_speed);
+    }
     const bool at_rest = fastest <= zero && rests(planned_);
     if (!(fastest <= options_.sleep_speed)) slow_since_ = t_;
     slow_since_ = std::min(slow_since_, t_);

@@ -23,6 +23,14 @@
 //  - a step is a straight line q + s v+, with the velocity v + s (v+ - v)/h, which may be cut at
 //    any s in [0, h], since the energy is convex along it. The scene therefore finds impacts of
 //    other bodies on the group in closed form.
+//
+// In a *crowd*, impacts that would rebound do not end a step. The step is the same, so that gaps
+// and the bound of the energy are; at its end those contacts that have closed in it rebound
+// together, by Newton's law with the approach before the step, as far as the step has lost energy:
+//
+//     M (v - v+) = G' r,    0 <= r_n,  n.(v - w) - e a >= 0, complementary;  friction
+//
+// with a the speed of approach at the start of the step and e a = 0 for contacts that were closed.
 #pragma once
 
 #include <array>
@@ -118,6 +126,9 @@ public:
     /// Kinetic energy and potential energy of gravity and of springs [J].
     [[nodiscard]] double energy() const;
     [[nodiscard]] const IslandStatistics& statistics() const noexcept { return statistics_; }
+    void set_crowded(bool crowded) noexcept { options_.crowded = crowded; }
+    /// Contacts that rebound at the end of the planned step of a crowd.
+    [[nodiscard]] std::uint32_t rebounds() const noexcept { return rebounds_; }
     [[nodiscard]] const LawReport& failure() const noexcept { return failure_; }
 
 private:
@@ -158,7 +169,16 @@ private:
     [[nodiscard]] bool stays_within(const std::vector<double>& reach, double h) const;
     [[nodiscard]] Eigen::VectorXd warm_impulses(double h) const;
     [[nodiscard]] double relative_normal(const Touch& touch, const Eigen::VectorXd& v) const;
+    [[nodiscard]] double rebound_speed(std::size_t k, double h, const Eigen::VectorXd& kick);
+    [[nodiscard]] Eigen::VectorXd kick() const;
     bool exclude_arrivals(double h);
+    void rebound(double h);
+    [[nodiscard]] bool set_rebounds(double h);
+    [[nodiscard]] LawContact closed_contact(const Touch& touch, double h) const;
+    [[nodiscard]] double lost(double h) const;
+    [[nodiscard]] double allowed_part(const Eigen::VectorXd& p, const Eigen::VectorXd& v,
+                                      double h) const;
+    bool attempt_in_crowd(double h);
     [[nodiscard]] double first_arrival(double h);
     [[nodiscard]] Touch on_chord(const Touch& touch, double s) const;
     [[nodiscard]] double closing_time(const Touch& touch, double h) const;
@@ -189,15 +209,20 @@ private:
     std::uint32_t open_steps_ = 0;
     double slow_since_ = std::numeric_limits<double>::infinity();
 
-    ContactLaw law_;
+    ContactLaw law_, impact_law_;
     LawProblem problem_;
     std::vector<Touch> touches_, excluded_;
     Eigen::VectorXd impulses_, v_next_;
+    Eigen::VectorXd v_end_;     ///< velocities after the impacts at the end of a step of a crowd
+    LawProblem impacts_;        ///< these impacts
     double planned_ = 0;        ///< [s] length of the current step
     double planned_until_ = 0;  ///< where it ends, or what ends it before
     std::vector<Touch> warm_;
     Eigen::VectorXd warm_impulses_;
     double warm_step_ = 0;
+    std::uint32_t rebounds_ = 0;
+    double enough_ = 0;  ///< residual that a step of a crowd may leave, 0 in other steps
+    std::uint32_t awake_steps_ = 0;  ///< of a crowd, since rest was looked for
 
     std::vector<IslandContact> arrivals_;
     IslandStatistics statistics_;

@@ -109,7 +109,7 @@ ContactIsland::ContactIsland(IslandSetup setup, const IslandOptions& options, do
 {
     check(setup);
     sort_members(std::move(setup));
-    project(options_.largest_overlap);
+    if (!options_.crowded) project(options_.largest_overlap);
 }
 
 int ContactIsland::place_of(std::uint32_t id) const

@@ -36,10 +36,11 @@ constexpr int iterations_without = 15;
 constexpr int iterations_less_stiff = 30;
 constexpr int rounds_of_one = 3;
 constexpr int most_rounds = 7;
+constexpr int last_batch = 4000;
 
 }  // namespace
 
-ContactLaw::Pair ContactLaw::relative(const LawContact& c, const Eigen::VectorXd& v) const
+ContactLaw::Pair ContactLaw::relative(const LawContact& c, const Eigen::VectorXd& v)
 {
     double x = v[2 * c.first];
     double y = v[2 * c.first + 1];
@@ -452,14 +453,14 @@ void ContactLaw::solve_densely(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport
     }
 }
 
-LawReport ContactLaw::solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
-                            bool last_resorts)
+/// Relaxes the impulses of the start; false where none is needed.
+bool ContactLaw::begin(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
+                       LawReport& report)
 {
     problem_ = &problem;
     stiffness_ = stiff;
     const auto n = 2 * static_cast<Eigen::Index>(problem.contacts.size());
     factor_inertia();
-    LawReport report;
     Eigen::VectorXd zero = Eigen::VectorXd::Zero(n);
     follow(zero, v);
     set_scale(v);
@@ -469,7 +470,7 @@ LawReport ContactLaw::solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen
     if (!pushed) {
         p = zero;
         report.converged = v.allFinite();
-        return report;
+        return false;
     }
     if (!p.isZero(0)) follow(p, v);
     report.residual = residual(p, v);
@@ -477,6 +478,87 @@ LawReport ContactLaw::solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen
         relax(p, v, 1);
         report.residual = residual(p, v);
     }
+    return true;
+}
+
+/// The contacts of a problem whose A is diagonal. A wall is a body of infinite mass, beyond the
+/// last one.
+void ContactLaw::lay_rows()
+{
+    rows_.clear();
+    const auto& inertia = problem_->inertia;
+    for (const LawContact& c : problem_->contacts) {
+        const bool wall = c.second < 0;
+        rows_.push_back({.first = 2 * c.first,
+                         .second = wall ? problem_->momentum.size() : 2 * c.second,
+                         .nx = c.normal[0],
+                         .ny = c.normal[1],
+                         .offset_n = c.offset[0],
+                         .offset_t = c.offset[1],
+                         .friction = c.friction,
+                         .mass = unit(c),
+                         .by_first = 1 / inertia[static_cast<std::size_t>(c.first)],
+                         .by_second = wall ? 0 : 1 / inertia[static_cast<std::size_t>(c.second)]});
+    }
+}
+
+/// As `sweep`; v has the velocity of walls, which is zero, at its end.
+void ContactLaw::sweep_rows(Eigen::VectorXd& p, Eigen::VectorXd& v) const
+{
+    double* impulse = p.data();
+    for (const Row& c : rows_) {
+        double* a = v.data() + c.first;
+        double* b = v.data() + c.second;
+        const double x = a[0] - b[0];
+        const double y = a[1] - b[1];
+        const double u_n = c.nx * x + c.ny * y + c.offset_n;
+        const double u_t = c.nx * y - c.ny * x + c.offset_t;
+        const double normal = std::max(0.0, impulse[0] - c.mass * u_n);
+        const double bound = c.friction * normal;
+        const double tangential = std::clamp(impulse[1] - c.mass * u_t, -bound, bound);
+        const double n = normal - impulse[0];
+        const double t = tangential - impulse[1];
+        impulse[0] = normal, impulse[1] = tangential;
+        impulse += 2;
+        const double push_x = c.nx * n - c.ny * t;
+        const double push_y = c.ny * n + c.nx * t;
+        a[0] += c.by_first * push_x;
+        a[1] += c.by_first * push_y;
+        b[0] -= c.by_second * push_x;
+        b[1] -= c.by_second * push_y;
+    }
+}
+
+LawReport ContactLaw::settle(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
+                             double enough, bool polish)
+{
+    LawReport report;
+    if (!begin(problem, p, v, report)) return report;
+    const bool diagonal = problem.couplings.empty();
+    if (diagonal) lay_rows();
+    for (int batch = first_batch; report.residual > enough && batch < last_batch; batch *= 2) {
+        if (diagonal) {
+            v.conservativeResizeLike(Eigen::VectorXd::Zero(problem.momentum.size() + 2));
+            for (int k = 0; k < batch; ++k) sweep_rows(p, v);
+            follow(p, v);
+        } else {
+            relax(p, v, batch);
+        }
+        report.sweeps += batch;
+        report.residual = residual(p, v);
+    }
+    report.converged = report.residual <= tolerance_;
+    if (report.converged || !polish) return report;
+    compare_pattern();
+    report.converged = newton(p, v, iterations_with_friction, report);
+    return report;
+}
+
+LawReport ContactLaw::solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
+                            bool last_resorts)
+{
+    LawReport report;
+    if (!begin(problem, p, v, report)) return report;
     report.converged = report.residual <= rounding || iterate(p, v, last_resorts, report);
     const bool small = problem.contacts.size() <= most_dense;
     if (report.residual > loose && std::isfinite(report.residual) && last_resorts && small) {

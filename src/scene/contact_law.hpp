@@ -75,17 +75,27 @@ public:
     LawReport solve(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
                     bool last_resorts = true);
 
-private:
-    enum class Active : unsigned char { open, sticks, slips_forward, slips_backward };
-    using Sparse = Eigen::SparseMatrix<double>;
+    /// The same by sweeps over the contacts until the residual is `enough`: for many contacts,
+    /// where paths are long. `polish`: whether Newton's method goes on from there. The
+    /// residual is the caller's to judge.
+    LawReport settle(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
+                     double enough, bool polish);
 
     struct Pair {
         double normal = 0, tangential = 0;
     };
-    [[nodiscard]] Pair relative(const LawContact& c, const Eigen::VectorXd& v) const;
+    /// Relative velocity of a contact.
+    [[nodiscard]] static Pair relative(const LawContact& c, const Eigen::VectorXd& v);
+
+private:
+    enum class Active : unsigned char { open, sticks, slips_forward, slips_backward };
+    using Sparse = Eigen::SparseMatrix<double>;
+
     static void push(const LawContact& c, double normal, double tangential, Eigen::VectorXd& b);
     [[nodiscard]] double unit(const LawContact& c) const;
 
+    bool begin(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
+               LawReport& report);
     void factor_inertia();
     void compare_pattern();
     void follow(const Eigen::VectorXd& p, Eigen::VectorXd& v);
@@ -102,6 +112,8 @@ private:
     void improve(Eigen::VectorXd& p, Eigen::VectorXd& u);
     void confine(Eigen::VectorXd& p) const;
     void sweep(Eigen::VectorXd& p, Eigen::VectorXd& v);
+    void lay_rows();
+    void sweep_rows(Eigen::VectorXd& p, Eigen::VectorXd& v) const;
     bool along_paths(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport& report);
     void begin_path(const Eigen::VectorXd& p, const Eigen::VectorXd& v);
     void begin_path_afar();
@@ -136,6 +148,13 @@ private:
     Sparse sparse_;
     Eigen::SparseLU<Sparse> sparse_lu_;
     Eigen::VectorXd right_, linear_, trial_p_, trial_v_;
+    /// A contact, with what many sweeps need: `mass` is its unit of inertia.
+    struct Row {
+        Eigen::Index first = 0, second = 0;
+        double nx = 0, ny = 0, offset_n = 0, offset_t = 0, friction = 0;
+        double mass = 0, by_first = 0, by_second = 0;
+    };
+    std::vector<Row> rows_;
     struct Path {
         Eigen::VectorXd w, w_rate;  ///< p - rho u + left shift, whose projection is p
         Eigen::VectorXd shift;

@@ -72,6 +72,7 @@ struct IslandOptions {
     double sleep_after = 0.5;       ///< [s]
     bool estimate_error = false;    ///< takes every step of `advance` by halves, too
     double largest_overlap = 1e-6;  ///< of a start, as a fraction of the coordinates
+    bool crowded = false;  ///< impacts that would rebound are part of the steps, see ContactIsland
 };
 
 /// A gap no larger than this fraction of the coordinates is closed.

@@ -8,6 +8,18 @@
 
 namespace ricochet::detail {
 
+namespace {
+
+/// A crowd ends after so many steps in a row without a rebound.
+constexpr std::uint32_t calm_steps = 100;
+/// It begins with so many cuts within one step.
+constexpr std::uint32_t crowded_cuts = 32;
+
+/// Overlap, as a fraction of the coordinates, that crowds may leave to the groups after them.
+constexpr double overlap_of_crowds = 1e-4;
+
+}  // namespace
+
 std::vector<std::uint32_t> Contacts::closure(const std::vector<std::uint32_t>& bodies) const
 {
     std::vector<std::uint32_t> all;
@@ -94,11 +106,12 @@ void Contacts::set_motions(IslandSetup& setup, Group& group, const Instant& now)
     }
 }
 
-/// Largest overlap relative to the coordinates: rounding and, where walls move, their deviation
-/// from the straight lines of a step.
+/// Largest overlap relative to the coordinates: rounding, what crowds leave and, where walls move,
+/// their deviation from the straight lines of a step.
 double Contacts::largest_overlap(const Group& group) const
 {
-    double most = IslandOptions{}.largest_overlap;
+    const bool crowds = world_.statistics.crowded_steps > 0;
+    double most = crowds ? overlap_of_crowds : IslandOptions{}.largest_overlap;
     const double h = world_.options.contact_step;
     for (const std::uint32_t f : group.faces) {
         if (!world_.moves(f)) continue;
@@ -113,13 +126,23 @@ double Contacts::largest_overlap(const Group& group) const
 }
 
 std::uint32_t Contacts::join(std::vector<std::uint32_t> members, std::vector<std::uint32_t> faces,
-                             const std::vector<std::uint32_t>& patience, const Instant& now)
+                             const std::vector<std::uint32_t>& patience, const Instant& now,
+                             bool crowded)
 {
     world_.drifts.resize(world_.bodies.size());
     std::vector<std::array<Vector2, 2>> states;
+    auto group = std::make_unique<Group>();
+    group->crowded = crowded;
     for (const std::uint32_t i : members) {
-        const std::uint32_t group = world_.bodies[i].contact;
-        if (group != none) commit(group, now);
+        const std::uint32_t part = world_.bodies[i].contact;
+        if (part != none) {
+            commit(part, now);
+            const Group& own = *groups_[part];
+            if (own.cuts > group->cuts) {
+                group->cuts = own.cuts;
+                group->counted = own.counted;
+            }
+        }
         states.push_back({world_.position(i, now), world_.velocity(i, now)});
     }
     for (std::size_t k = 0; k < members.size(); ++k) {
@@ -137,13 +160,13 @@ std::uint32_t Contacts::join(std::vector<std::uint32_t> members, std::vector<std
     }
     IslandSetup setup = setup_of(members, faces);
     for (std::size_t k = 0; k < members.size(); ++k) setup.bodies[k].patience = patience[k];
-    auto group = std::make_unique<Group>();
     set_motions(setup, *group, now);
     group->members = std::move(members);
     group->faces = std::move(faces);
-    group->motion = world_.options.contacts->make(
-        std::move(setup),
-        {.step = world_.options.contact_step, .largest_overlap = largest_overlap(*group)});
+    group->motion =
+        world_.options.contacts->make(std::move(setup), {.step = world_.options.contact_step,
+                                                         .largest_overlap = largest_overlap(*group),
+                                                         .crowded = crowded});
     group->start = group->end = now;
     const auto free = std::ranges::find_if(groups_, [](const auto& g) { return !g; });
     const auto number = static_cast<std::uint32_t>(free - groups_.begin());
@@ -161,11 +184,12 @@ IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Inst
 {
     Group& group = *groups_[which];
     const double left = seconds(now, t_end);
-    const auto [outcome, planned, step, defect, wakes] =
+    const auto [outcome, planned, step, defect, wakes, rebounds] =
         group.motion->plan(std::min(world_.options.contact_step, left));
     const bool asleep = outcome == IslandOutcome::asleep;
     const double length = asleep && wakes < never ? wakes : planned;
     group.outcome = outcome;
+    group.rebounds = rebounds;
     double& largest = world_.statistics.contact_defect;
     if (step > 0) largest = std::max(largest, defect);
     group.length = length;
@@ -176,6 +200,7 @@ IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Inst
     const bool over = seconds(group.end, t_end) <= resolution(t_end);
     if (length == left || (over && outcome != IslandOutcome::impact)) group.end = t_end;
     if (asleep && !(wakes < never)) group.end = t_end;
+    if (asleep && group.crowded) leave_crowd(group);
     const bool moves =
         step > 0 && (outcome == IslandOutcome::reached || outcome == IslandOutcome::impact);
     for (const std::uint32_t i : group.members) {
@@ -202,6 +227,8 @@ void Contacts::commit(std::uint32_t which, const Instant& now)
     const double s = whole ? group.length : seconds(group.start, now);
     if (!asleep || !group.motions.empty()) group.motion->commit(s);
     world_.statistics.contact_steps += !asleep && s > 0;
+    world_.statistics.crowded_steps += group.crowded && !asleep && s > 0;
+    if (whole && !asleep) world_.statistics.crowded_rebounds += group.rebounds;
     group.start = group.end = now;
     for (const std::uint32_t i : group.members) {
         const IslandBody state = group.motion->body(i);
@@ -211,6 +238,34 @@ void Contacts::commit(std::uint32_t which, const Instant& now)
         body.t = now;
         world_.drifts[i] = {state.velocity, {}};
     }
+}
+
+bool Contacts::crowds(std::uint32_t which, const Instant& now)
+{
+    Group& group = *groups_[which];
+    const std::uint64_t least = world_.options.crowded_from;
+    if (group.crowded || least == 0 || group.members.size() < least) return false;
+    if (seconds(group.counted, now) > world_.options.contact_step) {
+        group.counted = now;
+        group.cuts = 0;
+    }
+    return ++group.cuts >= crowded_cuts;
+}
+
+void Contacts::leave_crowd(Group& group)
+{
+    group.crowded = false;
+    group.cuts = group.calm = 0;
+    group.motion->set_crowded(false);
+}
+
+bool Contacts::stays_crowded(std::uint32_t which)
+{
+    Group& group = *groups_[which];
+    if (!group.crowded) return false;
+    group.calm = group.rebounds > 0 ? 0 : group.calm + 1;
+    if (group.calm >= calm_steps) leave_crowd(group);
+    return group.crowded;
 }
 
 void Contacts::dissolve(std::uint32_t which, const Instant& now)

@@ -29,7 +29,8 @@ public:
     /// Makes a group of `members`, a closure, which meets `faces`; their previous groups are
     /// removed. Returns its number. @throws std::invalid_argument where bodies overlap
     std::uint32_t join(std::vector<std::uint32_t> members, std::vector<std::uint32_t> faces,
-                       const std::vector<std::uint32_t>& patience, const Instant& now);
+                       const std::vector<std::uint32_t>& patience, const Instant& now,
+                       bool crowded = false);
 
     /// Plans the next step; its members get new records.
     IslandOutcome plan(std::uint32_t group, const Instant& now, const Instant& t_end);
@@ -39,6 +40,10 @@ public:
     {
         groups_[group]->motion->set_velocity(body, v);
     }
+    /// Counts an impact that cuts a step of a group; true where it makes it a crowd.
+    bool crowds(std::uint32_t group, const Instant& now);
+    /// Whether a crowd is still one after another step.
+    bool stays_crowded(std::uint32_t group);
     /// Removes a group: its members fly on from their records.
     void dissolve(std::uint32_t group, const Instant& now);
 
@@ -51,13 +56,19 @@ public:
         double length = 0;  ///< [s] from start to end
         IslandOutcome outcome = IslandOutcome::reached;
         bool planned = false;
-        std::uint32_t apart = 0;  ///< steps in which it has been several groups
+        std::uint32_t apart = 0;     ///< steps in which it has been several groups
+        bool crowded = false;        ///< impacts among its bodies are part of its steps
+        Instant counted{-never, 0};  ///< start of the step in which its cuts are counted
+        std::uint32_t cuts = 0;      ///< of its steps, by impacts and by bodies that join
+        std::uint32_t rebounds = 0;  ///< in the planned step of a crowd
+        std::uint32_t calm = 0;      ///< steps of a crowd with few rebounds
     };
     [[nodiscard]] bool exists(std::uint32_t group) const
     {
         return group < groups_.size() && groups_[group];
     }
     [[nodiscard]] Group& operator[](std::uint32_t group) { return *groups_[group]; }
+    [[nodiscard]] const Group& operator[](std::uint32_t group) const { return *groups_[group]; }
     [[nodiscard]] bool knows(std::uint32_t group, std::uint32_t face) const;
 
 private:
@@ -65,6 +76,7 @@ private:
                                        const std::vector<std::uint32_t>& faces) const;
     void set_motions(IslandSetup& setup, Group& group, const Instant& now) const;
     [[nodiscard]] double largest_overlap(const Group& group) const;
+    static void leave_crowd(Group& group);
 
     World& world_;
     std::vector<std::unique_ptr<Group>> groups_;

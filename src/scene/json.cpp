@@ -476,23 +476,22 @@ private:
     static void run(const Part& part, SceneOptions& options)
     {
         part.only({"t_start", "t_end", "rtol", "atol", "impacts", "elastic_within", "contact_step",
-                   "sample_times", "max_events", "record_events", "seed"});
+                   "crowded_from", "sample_times", "max_events", "record_events", "seed"});
         part.number("t_start", options.t_start);
         part.number("t_end", options.t_end);
         part.number("rtol", options.rtol);
         part.number("atol", options.atol);
         part.number("elastic_within", options.elastic_within);
         part.number("contact_step", options.contact_step);
-        if (part.has("max_events")) {
-            const json& most = part.at("max_events");
-            if (!most.is_number_unsigned()) part.expected("a whole number", "max_events", most);
-            options.max_events = most.get<std::uint64_t>();
-        }
-        if (part.has("seed")) {
-            const json& seed = part.at("seed");
-            if (!seed.is_number_unsigned()) part.expected("a whole number", "seed", seed);
-            options.seed = seed.get<std::uint64_t>();
-        }
+        const auto whole = [&](const char* key, std::uint64_t& value) {
+            if (!part.has(key)) return;
+            const json& given = part.at(key);
+            if (!given.is_number_unsigned()) part.expected("a whole number", key, given);
+            value = given.get<std::uint64_t>();
+        };
+        whole("max_events", options.max_events);
+        whole("seed", options.seed);
+        whole("crowded_from", options.crowded_from);
         if (part.has("record_events")) {
             const json& kept = part.at("record_events");
             if (!kept.is_boolean()) part.expected("true or false", "record_events", kept);

@@ -23,10 +23,11 @@ public:
     /// The next step, no longer than `longest`. The plan moves nothing.
     struct Plan {
         IslandOutcome outcome = IslandOutcome::reached;
-        double length = 0;  ///< [s] until it ends, or an arrival ends it
-        double step = 0;    ///< [s] in which velocities change to those of the chords
-        double defect = 0;  ///< of the contact law, as a fraction
-        double wakes = 0;   ///< [s] until a wall begins to move, infinite if none does
+        double length = 0;           ///< [s] until it ends, or an arrival ends it
+        double step = 0;             ///< [s] in which velocities change to those of the chords
+        double defect = 0;           ///< of the contact law, as a fraction
+        double wakes = 0;            ///< [s] until a wall begins to move, infinite if none does
+        std::uint32_t rebounds = 0;  ///< contacts of a crowd that rebound at its end
     };
     virtual Plan plan(double longest) = 0;
     /// Advances by s seconds in the planned step.
@@ -34,6 +35,7 @@ public:
     /// Velocity [m/s] of the straight line of a body in the planned step.
     [[nodiscard]] virtual std::array<double, 2> chord(std::uint32_t id) const = 0;
     [[nodiscard]] virtual IslandBody body(std::uint32_t id) const = 0;
+    virtual void set_crowded(bool crowded) = 0;
     virtual void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity) = 0;
     /// Bodies grouped by springs and by contacts that push.
     [[nodiscard]] virtual std::vector<std::vector<std::uint32_t>> groups() const = 0;

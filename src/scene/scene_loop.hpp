@@ -172,6 +172,15 @@ private:
     void resolve_cluster(std::uint32_t i);
     void press(std::uint32_t i, const std::string& sentence);
     void hand_over(const std::vector<std::uint32_t>& bodies, const std::string& sentence);
+    [[nodiscard]] bool can_last(const std::vector<std::uint32_t>& members,
+                                const std::vector<std::uint32_t>& faces,
+                                const std::vector<std::uint32_t>& bodies);
+    std::vector<std::uint32_t> take_out(const std::vector<std::uint32_t>& members);
+    [[nodiscard]] bool meets_crowd(const std::vector<std::uint32_t>& bodies) const;
+    void join(std::vector<std::uint32_t> members, const std::vector<std::uint32_t>& bodies,
+              bool crowded);
+    void crowd(std::uint32_t group);
+    [[nodiscard]] std::vector<std::uint32_t> with_arriving(std::vector<std::uint32_t> members);
     [[nodiscard]] std::vector<std::uint32_t> faces_near(
         const std::vector<std::uint32_t>& members) const;
     [[nodiscard]] std::vector<std::uint32_t> joining(double least, double most) const;
@@ -192,6 +201,8 @@ private:
     }
     void gather(std::uint32_t i, const Pending& seed);
     void gather_faces(std::uint32_t slot, std::uint32_t sure);
+    void gather_moving(std::uint32_t slot, std::uint32_t sure);
+    void touch_face(std::uint32_t slot, const Vector2& p, std::uint32_t f, const Vector2& normal);
     [[nodiscard]] double loose_motion(std::uint32_t face, double size) const;
     [[nodiscard]] std::vector<Side> sides_of(std::uint32_t i, std::uint32_t sure) const;
     void gather_pairs(std::uint32_t slot, std::uint32_t sure);
@@ -221,6 +232,18 @@ private:
     bool push_system(std::uint32_t island);
     void add_couplings();
     void settle(std::uint32_t i, std::uint32_t was);
+    struct Pressed {
+        std::vector<std::uint32_t> holding;  ///< faces that a body presses on
+        std::vector<Vector2> blocking;  ///< normals into which it cannot be pulled, overhanging
+                                        ///< faces included
+    };
+    [[nodiscard]] Pressed pressed_faces(const Body& body, const std::vector<std::uint32_t>& faces,
+                                        double gained) const;
+    struct Carrier {
+        std::uint32_t face = none;
+        bool leaves = false;  ///< whether it slides off a face instead
+    };
+    Carrier slide_on_one(std::uint32_t i, const Pressed& pressed);
     bool rests_on_face(std::uint32_t i);
     void halt(std::uint32_t i);
     [[nodiscard]] double slips_for(std::uint32_t i) const;

@@ -18,6 +18,9 @@ constexpr std::uint32_t patience_to_divide = 3;
 /// [radii] Distance of terrain from the centre of a disc up to which its group knows it.
 constexpr double ahead = 5;
 
+/// Steps within which a body must arrive to join a crowd before it does.
+constexpr double steps_ahead = 10;
+
 }  // namespace
 
 /// Whether the group of a body meets this face or body itself.
@@ -110,58 +113,128 @@ void SceneLoop::hand_over(const std::vector<std::uint32_t>& bodies, const std::s
                                 sentence.empty() ? called(bodies.front()) : sentence));
     }
     patience_.resize(world_.bodies.size());
+    const bool crowded = meets_crowd(bodies);
     std::vector<std::uint32_t> members = contacts_.closure(bodies);
+    if (crowded) members = with_arriving(std::move(members));
+    join(std::move(members), bodies, crowded);
+}
+
+/// Whether bodies can be in lasting contact near these faces; otherwise the run fails.
+bool SceneLoop::can_last(const std::vector<std::uint32_t>& members,
+                         const std::vector<std::uint32_t>& faces,
+                         const std::vector<std::uint32_t>& bodies)
+{
     for (const std::uint32_t i : members) {
         if (!world_.turning(i)) continue;
-        return fail(Outcome::zeno, bodies,
-                    fmt::format("{} is in lasting contact, which of discs that turn is followed on "
-                                "surfaces alone",
-                                called(i)));
+        fail(Outcome::zeno, bodies,
+             fmt::format("{} is in lasting contact, which of discs that turn is followed on "
+                         "surfaces alone",
+                         called(i)));
+        return false;
     }
     for (const std::uint32_t i : members) {
         if (!world_.bodies[i].mapped) continue;
-        return fail(
-            Outcome::zeno, bodies,
-            fmt::format("{} is in lasting contact, which of systems is not followed", called(i)));
+        fail(Outcome::zeno, bodies,
+             fmt::format("{} is in lasting contact, which of systems is not followed", called(i)));
+        return false;
     }
-    std::vector<std::uint32_t> patience;
-    std::vector<std::uint32_t> joined;
-    for (const std::uint32_t i : members) {
-        const Body& body = world_.bodies[i];
-        if (body.contact == none) {
-            joined.push_back(i);
-            Backoff& own = patience_[i];
-            own.steps = next_patience(own.steps, -seconds(own.released, now_), 0,
-                                      world_.options.contact_step);
-            if (body.island != none) {
-                calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + body.island,
-                              no_instant);
-            }
-        } else {
-            calendar_.set(entry_of_group(body.contact), no_instant);
-        }
-        patience.push_back(patience_[i].steps);
-    }
-    std::vector<std::uint32_t> faces = faces_near(members);
     const bool segments = std::ranges::any_of(
         faces, [&](std::uint32_t f) { return world_.faces[f].kind != Face::Kind::wall; });
     for (const std::uint32_t i : members) {
-        if (segments && world_.bodies[i].radius == 0) {
-            return fail(Outcome::zeno, {i},
-                        fmt::format("'{}' is a point in lasting contact near terrain; only discs "
-                                    "can be in lasting contact there",
-                                    called(i)));
+        if (!segments || world_.bodies[i].radius > 0) continue;
+        fail(Outcome::zeno, {i},
+             fmt::format("'{}' is a point in lasting contact near terrain; only discs can be in "
+                         "lasting contact there",
+                         called(i)));
+        return false;
+    }
+    return true;
+}
+
+/// Takes bodies that are to be a group out of the calendar. Returns those that were in none.
+std::vector<std::uint32_t> SceneLoop::take_out(const std::vector<std::uint32_t>& members)
+{
+    std::vector<std::uint32_t> joined;
+    for (const std::uint32_t i : members) {
+        const Body& body = world_.bodies[i];
+        if (body.contact != none) {
+            calendar_.set(entry_of_group(body.contact), no_instant);
+            continue;
+        }
+        joined.push_back(i);
+        Backoff& own = patience_[i];
+        own.steps =
+            next_patience(own.steps, -seconds(own.released, now_), 0, world_.options.contact_step);
+        if (body.island != none) {
+            calendar_.set(static_cast<std::uint32_t>(world_.bodies.size()) + body.island,
+                          no_instant);
         }
     }
+    return joined;
+}
+
+/// Makes a group of `members`; `bodies` are those that were found in contact.
+void SceneLoop::join(std::vector<std::uint32_t> members, const std::vector<std::uint32_t>& bodies,
+                     bool crowded)
+{
+    std::vector<std::uint32_t> faces = faces_near(members);
+    if (!can_last(members, faces, bodies)) return;
+    const std::vector<std::uint32_t> joined = take_out(members);
+    std::vector<std::uint32_t> patience;
+    for (const std::uint32_t i : members) patience.push_back(patience_[i].steps);
     try {
         const std::uint32_t group =
-            contacts_.join(std::move(members), std::move(faces), patience, now_);
+            contacts_.join(std::move(members), std::move(faces), patience, now_, crowded);
         for (const std::uint32_t i : joined) note_group(SceneEvent::Kind::joined, i);
         if (!joined.empty()) ++result_.event_count;
+        if (contacts_.crowds(group, now_)) return crowd(group);
         plan_group(group);
     } catch (const std::invalid_argument& error) {
         fail(Outcome::zeno, bodies, error.what());
     }
+}
+
+bool SceneLoop::meets_crowd(const std::vector<std::uint32_t>& bodies) const
+{
+    return std::ranges::any_of(bodies, [&](std::uint32_t i) {
+        const std::uint32_t group = world_.bodies[i].contact;
+        return group != none && contacts_[group].crowded;
+    });
+}
+
+/// Makes a group a crowd, with all bodies that will arrive soon.
+void SceneLoop::crowd(std::uint32_t number)
+{
+    std::vector<std::uint32_t> members = contacts_[number].members;
+    join(with_arriving(members), members, true);
+}
+
+/// Adds bodies that meet one of the members, or one another, within some steps, so that a crowd is
+/// not cut by each of them.
+std::vector<std::uint32_t> SceneLoop::with_arriving(std::vector<std::uint32_t> members)
+{
+    const double soon = steps_ahead * world_.options.contact_step;
+    const double fall = norm(world_.gravity) * soon * soon;
+    std::vector<char> known(world_.bodies.size(), 0);
+    for (const std::uint32_t i : members) known[i] = 1;
+    for (std::size_t k = 0; k < members.size(); ++k) {
+        const std::uint32_t i = members[k];
+        const Vector2 p = world_.position(i, now_);
+        const Vector2 v = world_.velocity(i, now_);
+        grid_.each_near(world_.bodies, i, pending_[i].cell, [&](std::uint32_t j) {
+            const Body& other = world_.bodies[j];
+            if (known[j] || other.mapped || world_.turning(j)) return;
+            const double reach = world_.bodies[i].radius + other.radius;
+            if (reach == 0) return;
+            const double gap = norm(p - world_.position(j, now_)) - reach;
+            if (gap > soon * norm(v - world_.velocity(j, now_)) + fall) return;
+            for (const std::uint32_t also : contacts_.closure({j})) {
+                if (!std::exchange(known[also], 1)) members.push_back(also);
+            }
+        });
+    }
+    std::ranges::sort(members);
+    return members;
 }
 
 void SceneLoop::note_group(SceneEvent::Kind kind, std::uint32_t i)
@@ -216,7 +289,7 @@ void SceneLoop::step_group(std::uint32_t number)
     const bool arrival = contacts_[number].outcome == IslandOutcome::impact;
     contacts_.commit(number, now_);
     if (arrival) return arrive(number);
-    if (!divide(number)) plan_group(number);
+    if (contacts_.stays_crowded(number) || !divide(number)) plan_group(number);
 }
 
 /// Resolves an impact between bodies of one group that meet fast enough to rebound.

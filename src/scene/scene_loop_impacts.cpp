@@ -138,6 +138,24 @@ std::vector<Side> SceneLoop::sides_of(std::uint32_t i, std::uint32_t sure) const
     return radius > 0 ? World::rounding(p, radius) / radius : 0;
 }
 
+/// Adds a contact of a body of the cluster, at p, with a face.
+[[gnu::always_inline]] inline void SceneLoop::touch_face(std::uint32_t slot, const Vector2& p,
+                                                         std::uint32_t f, const Vector2& normal)
+{
+    const std::uint32_t i = cluster_.bodies[slot];
+    const Body& body = world_.bodies[i];
+    Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
+    contact.normal = normal;
+    contact.at = p - body.radius * normal;
+    if (is_round(world_.faces[f].kind)) {
+        contact.blur = blur_of_normal(world_.faces[f], body.radius, p);
+    }
+    contact.restitution = world_.restitution(body.material, world_.faces[f].material);
+    contact.friction = world_.friction(body.material, world_.faces[f].material);
+    if (!world_.plain_laws) set_laws(contact, body.material, world_.faces[f].material);
+    cluster_.contacts.push_back(contact);
+}
+
 /// Gathers contacts of a body of the cluster with faces; `sure` counts as touched at any gap.
 void SceneLoop::gather_faces(std::uint32_t slot, std::uint32_t sure)
 {
@@ -146,18 +164,6 @@ void SceneLoop::gather_faces(std::uint32_t slot, std::uint32_t sure)
     const Vector2 p = world_.position(i, now_);
     const Vector2 v = cluster_.before[slot];
     if (body.mapped) return cluster_.sides.emplace_back(), void();  // has its own guards
-    const auto touch = [&](std::uint32_t f, const Vector2& normal) {
-        Contact contact{.a = i, .b = f, .surface = true, .slot_a = slot};
-        contact.normal = normal;
-        contact.at = p - body.radius * normal;
-        if (is_round(world_.faces[f].kind)) {
-            contact.blur = blur_of_normal(world_.faces[f], body.radius, p);
-        }
-        contact.restitution = world_.restitution(body.material, world_.faces[f].material);
-        contact.friction = world_.friction(body.material, world_.faces[f].material);
-        if (!world_.plain_laws) set_laws(contact, body.material, world_.faces[f].material);
-        cluster_.contacts.push_back(contact);
-    };
     const double near = body.radius + 1e-6 * (body.radius + norm(p));
     const auto look = [&](std::uint32_t f) {
         const Face& face = world_.faces[f];
@@ -170,7 +176,7 @@ void SceneLoop::gather_faces(std::uint32_t slot, std::uint32_t sure)
                            2 * resolution(now_) * std::fabs(dot(v, at.normal));
         if (known_to_group(i, true, f)) tolerance += loose * (body.radius + norm(p));
         if (f != sure && !(at.gap <= tolerance && at.gap >= -1e3 * tolerance)) return;
-        touch(f, at.normal);
+        touch_face(slot, p, f, at.normal);
     };
     if (!is_away_from_walls(i)) {
         for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
@@ -184,13 +190,24 @@ void SceneLoop::gather_faces(std::uint32_t slot, std::uint32_t sure)
             world_.passes_end(body, side.face, side.above, p, v, flown)) {
             continue;
         }
-        touch(side.face, arc          ? face_gap(face, body, p, side.above, flown).normal
-                         : side.above ? face.normal
-                                      : -1.0 * face.normal);
+        touch_face(slot, p, side.face,
+                   arc          ? face_gap(face, body, p, side.above, flown).normal
+                   : side.above ? face.normal
+                                : -1.0 * face.normal);
     }
     if (body.radius > 0 && on_terrain_) {
         for (const std::uint32_t f : faces_of(i)) look(f);
     }
+    if (!world_.motions.empty()) gather_moving(slot, sure);
+}
+
+/// Gathers contacts of a body of the cluster with faces that move.
+void SceneLoop::gather_moving(std::uint32_t slot, std::uint32_t sure)
+{
+    const std::uint32_t i = cluster_.bodies[slot];
+    const Body& body = world_.bodies[i];
+    const Vector2 p = world_.position(i, now_);
+    const Vector2 v = cluster_.before[slot];
     const auto count = static_cast<std::uint32_t>(world_.faces.size());
     for (std::uint32_t f = world_.fixed_count; f < count; ++f) {
         const FaceGap at = world_.moving_gap(f, body.radius, p, now_);
@@ -207,7 +224,7 @@ void SceneLoop::gather_faces(std::uint32_t slot, std::uint32_t sure)
                    world_.faces[c.b].surface == world_.faces[f].surface;
         });
         if (again) continue;
-        touch(f, at.normal);
+        touch_face(slot, p, f, at.normal);
         cluster_.contacts.back().moving = true;
         cluster_.contacts.back().surface_velocity = w;
     }
@@ -375,7 +392,8 @@ void SceneLoop::resolve_cluster(std::uint32_t i)
     // A body whose flight back and forth would be shorter than a step of the group that it meets
     // joins that group.
     const double slow = 0.5 * norm(world_.gravity) * world_.options.contact_step;
-    if (const auto bodies = joining(0, slow); !bodies.empty()) return hand_over(bodies, "");
+    const double most = meets_crowd(cluster_.bodies) ? never : slow;
+    if (const auto bodies = joining(0, most); !bodies.empty()) return hand_over(bodies, "");
     bool spend = false;
     if (within == 0) {
         for (std::uint32_t slot = 0; slot < cluster_.bodies.size(); ++slot) {
@@ -484,6 +502,10 @@ void SceneLoop::apply(bool struck)
     result_.event_count += struck;
     for (const std::uint32_t island : islands) restart_island(island);
     for (const std::uint32_t group : groups_struck_) restart_group(group);
+    for (const std::uint32_t group : groups_struck_) {
+        if (!contacts_.exists(group) || result_.failure) continue;
+        if (contacts_.crowds(group, now_)) crowd(group);
+    }
     if (result_.failure) return;
     for (const std::uint32_t i : changed_) {
         if (world_.bodies[i].island != none || world_.bodies[i].contact != none) continue;

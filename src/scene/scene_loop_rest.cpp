@@ -30,6 +30,52 @@ std::vector<std::uint32_t> SceneLoop::touching_faces(std::uint32_t i) const
     return faces;
 }
 
+/// The faces of `faces` that hold a body against gravity, where a speed of `gained` [m/s] is below
+/// what the time resolves.
+[[gnu::always_inline]] inline SceneLoop::Pressed SceneLoop::pressed_faces(
+    const Body& body, const std::vector<std::uint32_t>& faces, double gained) const
+{
+    Pressed pressed;
+    const double still = std::max(8 * epsilon * norm(body.v), 0.5 * gained);
+    for (const std::uint32_t f : faces) {
+        const Vector2 n = world_.push_of(body, f);
+        const double pull = dot(world_.gravity, n);
+        const double leaves = dot(body.v, n);
+        if (leaves < -still) continue;
+        if (leaves <= still) pressed.blocking.push_back(n);
+        if (pull >= 0) continue;
+        if (2 * leaves <= resolution(body.t) * -pull || leaves <= 8 * epsilon * norm(body.v)) {
+            pressed.holding.push_back(f);
+        }
+    }
+    return pressed;
+}
+
+/// Lets a body slide on the first of the faces that hold it which carries it by itself.
+[[gnu::always_inline]] inline SceneLoop::Carrier SceneLoop::slide_on_one(std::uint32_t i,
+                                                                         const Pressed& pressed)
+{
+    Body& body = world_.bodies[i];
+    const double rounding = 8 * epsilon * norm(world_.gravity);
+    Carrier carrier;
+    const Vector2 flight = body.v;
+    for (const std::uint32_t f : pressed.holding) {
+        body.v = flight;
+        world_.slide(i, f);
+        const bool stays = std::ranges::all_of(
+            pressed.blocking, [&](const Vector2& n) { return dot(body.a, n) >= -rounding; });
+        if (!stays) continue;
+        const Vector2& heading = is_zero(body.v) ? body.a : body.v;
+        if (!world_.leads_off(world_.faces[f], body.p, heading)) {
+            carrier.face = f;
+            return carrier;
+        }
+        carrier.leaves = true;
+    }
+    if (carrier.leaves) body.v = flight;
+    return carrier;
+}
+
 /// Keeps a body whose bounces are shorter than the time resolves on its surfaces: at rest, or
 /// sliding on one of them. `was` is the face on which it slid before.
 void SceneLoop::settle(std::uint32_t i, std::uint32_t was)
@@ -43,62 +89,31 @@ void SceneLoop::settle(std::uint32_t i, std::uint32_t was)
     const double gained =
         std::max(resolution(body.t) * pull_of_all, std::sqrt(2 * pull_of_all * rise));
     if (norm(body.v) <= gained) body.v = {};
-    const double still = std::max(8 * epsilon * norm(body.v), 0.5 * gained);
-    const double rounding = 8 * epsilon * pull_of_all;
-    std::vector<std::uint32_t> holding;
-    std::vector<Vector2> blocking;  // normals into which it cannot be pulled, overhanging faces
-                                    // included
-    for (const std::uint32_t f : faces) {
-        const Vector2 n = world_.push_of(body, f);
-        const double pull = dot(world_.gravity, n);
-        const double leaves = dot(body.v, n);
-        if (leaves < -still) continue;
-        if (leaves <= still) blocking.push_back(n);
-        if (pull >= 0) continue;
-        if (2 * leaves <= resolution(body.t) * -pull || leaves <= 8 * epsilon * norm(body.v)) {
-            holding.push_back(f);
-        }
-    }
-    if (holding.empty()) {
+    const Pressed pressed = pressed_faces(body, faces, gained);
+    if (pressed.holding.empty()) {
         body.v = velocity;
         return;
     }
-    for (const std::uint32_t f : holding) {
+    for (const std::uint32_t f : pressed.holding) {
         const Vector2 n = world_.push_of(body, f);
         body.v = body.v - dot(body.v, n) * n;
     }
-    std::uint32_t chosen = none;
-    bool leaves = false;
-    const Vector2 flight = body.v;
-    for (std::size_t k = 0; k < holding.size() && chosen == none; ++k) {
-        body.v = flight;
-        world_.slide(i, holding[k]);
-        const bool stays = std::ranges::all_of(
-            blocking, [&](const Vector2& n) { return dot(body.a, n) >= -rounding; });
-        if (!stays) continue;
-        const Vector2& heading = is_zero(body.v) ? body.a : body.v;
-        if (world_.leads_off(world_.faces[holding[k]], body.p, heading)) {
-            leaves = true;
-        } else {
-            chosen = holding[k];
-        }
-    }
-    if (chosen == none && leaves) {
-        body.v = flight;
+    Carrier carrier = slide_on_one(i, pressed);
+    if (carrier.face == none && carrier.leaves) {
         body.a = world_.gravity;
         body.held = none;
         body.asleep = false;
         if (world_.turning(i)) world_.set_spin(i, body.t, world_.spin(i, body.t));
         return;
     }
-    if (chosen == none) {
+    if (carrier.face == none) {
         // No single face carries the body, so it lies in the corner of two faces.
         body.v = body.a = {};
         body.asleep = true;
-        body.held = chosen = holding[0];
-        if (world_.turning(i)) stop_turning(i, holding);
+        body.held = carrier.face = pressed.holding[0];
+        if (world_.turning(i)) stop_turning(i, pressed.holding);
     }
-    if (chosen != was) note(SceneEvent::Kind::held, i, chosen, velocity);
+    if (carrier.face != was) note(SceneEvent::Kind::held, i, carrier.face, velocity);
 }
 
 /// In a corner friction stops a disc from turning.

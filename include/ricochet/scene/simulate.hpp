@@ -86,6 +86,11 @@ struct SceneOptions {
     const SceneContacts* contacts = nullptr;
     double contact_step = 1e-3;  ///< [s] step of groups in lasting contact; order 1
 
+    /// Bodies from which a group in lasting contact may become a crowd; 0: never. It becomes one
+    /// where 32 impacts cut its steps within one `contact_step`: it then takes whole steps, at
+    /// whose ends the contacts that have closed in them rebound together.
+    std::uint64_t crowded_from = 64;
+
     bool record_events = true;           ///< off: events are counted, not kept
     std::vector<double> sample_times{};  ///< [s] ascending; they do not affect the motion
     std::uint64_t max_events = std::numeric_limits<std::uint64_t>::max();
@@ -126,12 +131,15 @@ struct SceneStatistics {
     std::uint64_t steps = 0;        ///< steps of islands with springs or drag
     std::uint64_t rejected = 0;
     std::uint64_t flow_calls = 0;
-    std::uint64_t joins = 0;          ///< hand-overs of bodies to groups in lasting contact
-    std::uint64_t contact_steps = 0;  ///< steps of such groups
-    double contact_defect = 0;        ///< largest residual of their contact law, relative to the
-                                      ///< velocities: 1e-10, or 1e-7 if bodies are wedged
-    std::uint64_t alone = 0;          ///< bodies that could meet no other body
-    std::uint64_t groups = 0;         ///< groups of bodies that could meet
+    std::uint64_t joins = 0;             ///< hand-overs of bodies to groups in lasting contact
+    std::uint64_t contact_steps = 0;     ///< steps of such groups
+    std::uint64_t crowded_steps = 0;     ///< of these steps, those of crowds
+    std::uint64_t crowded_rebounds = 0;  ///< contacts that rebounded in them, not among `impacts`
+    double contact_defect = 0;           ///< largest residual of their contact law, relative to the
+                                         ///< velocities: 1e-10, 1e-7 if bodies are wedged, 1e-4
+                                         ///< in crowds
+    std::uint64_t alone = 0;             ///< bodies that could meet no other body
+    std::uint64_t groups = 0;            ///< groups of bodies that could meet
 };
 
 /// Result of a run. Nothing that was computed is lost, whatever the outcome.

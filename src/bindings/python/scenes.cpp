@@ -192,6 +192,7 @@ template <class T>
          }},
         {"elastic_within", setter(&SceneOptions::elastic_within)},
         {"contact_step", setter(&SceneOptions::contact_step)},
+        {"crowded_from", setter(&SceneOptions::crowded_from)},
         {"record_events", setter(&SceneOptions::record_events)},
         {"sample_times", setter(&SceneOptions::sample_times)},
         {"max_events", setter(&SceneOptions::max_events)},
@@ -315,12 +316,13 @@ template <class Of>
 [[nodiscard]] py::dict counts_of(const SceneStatistics& s)
 {
     using namespace py::literals;
-    return py::dict("impacts"_a = s.impacts, "events"_a = s.events, "waves"_a = s.waves,
-                    "collapses"_a = s.collapses, "predictions"_a = s.predictions,
-                    "stale"_a = s.stale, "crossings"_a = s.crossings, "steps"_a = s.steps,
-                    "rejected"_a = s.rejected, "flow_calls"_a = s.flow_calls, "joins"_a = s.joins,
-                    "contact_steps"_a = s.contact_steps, "contact_defect"_a = s.contact_defect,
-                    "alone"_a = s.alone, "groups"_a = s.groups);
+    return py::dict(
+        "impacts"_a = s.impacts, "events"_a = s.events, "waves"_a = s.waves,
+        "collapses"_a = s.collapses, "predictions"_a = s.predictions, "stale"_a = s.stale,
+        "crossings"_a = s.crossings, "steps"_a = s.steps, "rejected"_a = s.rejected,
+        "flow_calls"_a = s.flow_calls, "joins"_a = s.joins, "contact_steps"_a = s.contact_steps,
+        "crowded_steps"_a = s.crowded_steps, "crowded_rebounds"_a = s.crowded_rebounds,
+        "contact_defect"_a = s.contact_defect, "alone"_a = s.alone, "groups"_a = s.groups);
 }
 
 /// Runs a scene while other threads of Python go on.
