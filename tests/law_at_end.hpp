@@ -13,8 +13,8 @@ template <class System, class Run>
     constexpr int N = detail::solver_components<System::state_size, System::reaction_size>;
     constexpr int M = detail::solver_reactions<System::state_size, System::reaction_size>;
     const detail::AnyMatrices<N, M> matrices(detail::inclusion_of<N, M>(system));
-    const Eigen::Map<const Eigen::Matrix<double, System::reaction_size, 1>> reaction(
-        run.reaction.data());
+    using Reaction = Eigen::Matrix<double, System::reaction_size, 1>;
+    const Reaction reaction = Eigen::Map<const Reaction>(run.reaction.data());
     return law_violation(matrices, run.t, detail::resized<N>(run.x), detail::resized<M>(reaction),
                          h);
 }
