@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
 #include <numbers>
 #include <random>
 #include <vector>
@@ -165,26 +164,19 @@ TEST(Crowd, TwoHundredDiscsComeToRest)
 
 TEST(Crowd, ComesToTheSameHeightAsEventByEvent)
 {
-    // Means over some piles of 30 discs: places differ, since impacts magnify any difference.
-    double crowded = 0;
-    double exact = 0;
-    std::uint64_t steps = 0;
-    for (unsigned seed = 1; seed <= 8; ++seed) {
-        const Pile pile = discs_in_box(30, 0.75, 0.5, seed);
-        SceneOptions options = rows_until(3);
-        options.crowded_from = 0;
-        const SceneRun by_events = simulate(pile.scene, options);
-        ASSERT_EQ(by_events.outcome, Outcome::reached_end) << by_events.message;
-        EXPECT_EQ(by_events.statistics.crowded_steps, 0U);
-        exact += height(pile, by_events.bodies) / 8;
-        options.crowded_from = 2;
-        const SceneRun by_steps = simulate(pile.scene, options);
-        ASSERT_EQ(by_steps.outcome, Outcome::reached_end) << by_steps.message;
-        steps += by_steps.statistics.crowded_steps;
-        crowded += height(pile, by_steps.bodies) / 8;
-    }
-    EXPECT_GT(steps, 0U);
-    EXPECT_NEAR(crowded, exact, 0.02 * exact);
+    // Places differ, since impacts magnify any difference; of the height that is the packing's,
+    // less than 1 %: it differed by up to 0.4 % in four such piles.
+    const Pile pile = discs_in_box(140, 2, 0.5, 1);
+    SceneOptions options = rows_until(3);
+    const SceneRun by_steps = simulate(pile.scene, options);
+    ASSERT_EQ(by_steps.outcome, Outcome::reached_end) << by_steps.message;
+    EXPECT_GT(by_steps.statistics.crowded_steps, 0U);
+    options.crowded_from = 0;
+    const SceneRun by_events = simulate(pile.scene, options);
+    ASSERT_EQ(by_events.outcome, Outcome::reached_end) << by_events.message;
+    EXPECT_EQ(by_events.statistics.crowded_steps, 0U);
+    const double exact = height(pile, by_events.bodies);
+    EXPECT_NEAR(height(pile, by_steps.bodies), exact, 0.01 * exact);
 }
 
 TEST(Crowd, ThereIsNoneOfFewBodies)
