@@ -29,9 +29,11 @@ class SystemInC {
     static constexpr int n = state_size<Set>, m = reaction_size<Set>;
 
 public:
-    /// Whether C has inclusions of this size and kind.
-    static constexpr bool fits = n >= 1 && n <= 8 && m >= 1 && m <= 4 && BoxSet<SetOf<Set>> &&
-                                 detail::confines<Set>() == Confines::reaction;
+    /// Whether C has inclusions of this size and kind. In C an inclusion says in which modes it
+    /// acts; a system whose guards say it tells so by `disabled_guards_end_it`.
+    static constexpr bool fits = !requires { System::disabled_guards_end_it; }
+    &&n >= 1 && n <= 8 && m >= 1 && m <= 4 &&
+        BoxSet<SetOf<Set>>&& detail::confines<Set>() == Confines::reaction;
 
     SystemInC(const System& system, const X& x0)
         : system_(system), parts_(system, x0, {}, {}, {}), of_(parts_.setup())
@@ -339,6 +341,7 @@ public:
         given.t_end = options.t_end;
         given.rtol = options.rtol;
         given.atol = options.atol;
+        given.h_max = options.h_max;
         given.mode = options.mode;
         given.stop_at_event = options.stop_at_event;
         given.sample_times = options.sample_times.data();

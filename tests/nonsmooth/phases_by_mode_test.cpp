@@ -262,6 +262,7 @@ TEST(PhasesByMode, AGuardAsksItsReactionWhereAResetLeavesItAtRest)
 
 /// The brake with one inclusion for both modes. Its guard, the speed, is off when the brake is.
 struct GuardedBrake : Automaton<2> {
+    static constexpr bool disabled_guards_end_it = true;
     void set_valued(Mode) const = delete;
     [[nodiscard]] Motion set_valued() const { return *motion(0); }
     [[nodiscard]] static Mode start_mode(Mode mode, double, const Two&) { return mode; }

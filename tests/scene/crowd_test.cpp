@@ -166,7 +166,7 @@ TEST(Crowd, ComesToTheSameHeightAsEventByEvent)
 {
     // Places differ, since impacts magnify any difference; of the height that is the packing's,
     // less than 1 %: it differed by up to 0.4 % in four such piles.
-    const Pile pile = discs_in_box(140, 2, 0.5, 1);
+    const Pile pile = discs_in_box(90, 1.4, 0.5, 1);
     SceneOptions options = rows_until(3);
     const SceneRun by_steps = simulate(pile.scene, options);
     ASSERT_EQ(by_steps.outcome, Outcome::reached_end) << by_steps.message;
