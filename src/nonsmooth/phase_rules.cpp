@@ -362,6 +362,8 @@ Kind PhaseRules::decide_own(const Set& set, double* x)
         }
         const std::size_t i = fired.which != no_guard ? reaction_of(fired.which) : fired.reaction;
         if (y_[i] != y_before_[i]) continue;  // a reset has moved it on
+        // A reset of an earlier set of this instant has carried it across zero.
+        if (y_[i] * sides_[i] > 0 && is_clear(i, y_[i], x)) continue;
         arrived_[i] = asks = true;
         at = BranchPhases::with_branch(i, Branch::inside, at);
     }

@@ -43,6 +43,41 @@ struct Plain {
                        .upper = {1}}};
 }
 
+/// A block on the ground with friction 1/4 that a wall at 1 throws back elastically; no guard of
+/// its own stands for its speed. State (position, velocity).
+struct BlockAtWall {
+    using State = std::array<double, 2>;
+    static void flow(double, const State& x, State& dxdt)
+    {
+        dxdt = {x[1], x[1] > 0 ? -0.25 : 0.25};
+    }
+    static double guard(double, const State& x) { return 1 - x[0]; }
+    static void reset(double, State& x) { x[1] = -x[1]; }
+    [[nodiscard]] static BoxMotion<2, 1> set_valued()
+    {
+        return {.f =
+                    [](double, const State& x, State& dxdt) {
+                        dxdt = {x[1], 0};
+                    },
+                .e = {{{0, 1}}},
+                .lower = {-0.25},
+                .upper = {0.25}};
+    }
+};
+
+TEST(PhasesSystems, ABlockThatAWallThrowsBackSlidesOn)
+{
+    // Speed 2 falls by 1/4 each second whatever its sign: at rest at 8, after 8 m, of which 1 m was
+    // before the wall.
+    for (const double h_max : {std::numeric_limits<double>::infinity(), 0.1}) {
+        Options options = until(10);
+        options.h_max = h_max;
+        const auto run = run_of(BlockAtWall{}, BlockAtWall::State{0, 2}, options);
+        expect_end(run, BlockAtWall::State{-6, 0});
+        expect_times(times_of(run.events, EventKind::stick), {8});
+    }
+}
+
 // w' = 2 t - 2 above zero: from 1 - d it reaches zero at 1 - sqrt(d), and slips at 1.
 TEST(PhasesSystems, ASpeedThatGrazesZeroTouchesItOnce)
 {

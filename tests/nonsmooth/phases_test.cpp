@@ -181,6 +181,29 @@ TEST(Phases, ATimeEventKicksTheHeldBlock)
     expect_times(times_of(run.events, EventKind::slip), {2});
 }
 
+// From 1 with the rate 1/2 - 1: 1 - u/2 at u, where it changes its sign; with the rate 3/2 it comes
+// to rest after another (1 - u/2) / (3/2). With short steps the reset lies in a step that does not
+// reach zero by itself.
+TEST(Phases, AResetThatCarriesASlidingSpeedAcrossZeroIsNoArrival)
+{
+    const auto load = [](double, const One&, One& dxdt) { dxdt = {0.5}; };
+    const auto turn = [](double, One& x) { x[0] = -x[0]; };
+    for (const double at : {0.3, 0.5, 1.1}) {
+        const OwnGuard<1> mark{{}, [=](double t, const One&) { return at - t; }, turn};
+        const Slider<1> by_guard{.f = load, .own = {mark}};
+        const Slider<1> by_time{.f = load, .next = once(at), .kick = turn};
+        for (const Slider<1>& system : {by_guard, by_time}) {
+            for (const double h_max : {never, 0.01}) {
+                Options options = until(3);
+                options.h_max = h_max;
+                const auto run = run_of(system, One{1}, options);
+                expect_end(run, One{0});
+                expect_times(times_of(run.events, EventKind::stick), {at + (1 - at / 2) / 1.5});
+            }
+        }
+    }
+}
+
 TEST(Phases, ATimeEventAtWhichTheFrictionDropsReleasesTheBlock)
 {
     struct Drops : Slider<1> {
