@@ -535,6 +535,60 @@ TEST(StaticFriction, ADiscIsHeldWhereItStopsUnderALoadBetweenItsBounds)
     EXPECT_NEAR(turned.x.norm(), 0.6, of_steps);
 }
 
+TEST(StaticFriction, ADiscThatStartsAtRestIsHeldUpToItsStaticBound)
+{
+    for (const double load : {0.51, 0.7, 0.99, 1.0}) {
+        const Disc disc{.load = [load](double) { return Disc::W(Disc::W(0.6, 0.8) * load); }};
+        EXPECT_EQ(hand_over(disc, Disc::W{0, 0}, {.t_end = 3}).x, Disc::W(0, 0)) << load;
+    }
+    const Disc beyond{.load = [](double) { return Disc::W(0.66, 0.88); }};  // 1.1
+    EXPECT_NEAR(hand_over(beyond, Disc::W{0, 0}, {.t_end = 3}).x.norm(), 0.6 * 3, of_steps);
+}
+
+TEST(StaticFriction, ADiscIsHeldWhereverInAStepItStops)
+{
+    // v' = 0.7 + 0.5 against the load, in steps of 3 ms: at the end of a step, and by any distance
+    // before and behind it.
+    const Disc disc{.load = [](double) { return Disc::W(0.7, 0); }};
+    for (const int steps : {1, 4, 20, 33}) {
+        for (const double off : {0.0, 1e-15, 1e-13, 1e-11, 1e-10, 3e-9, 1e-8, 1e-7, 1e-5, 0.3}) {
+            for (const double sign : {-1, 1}) {
+                const double v = -0.0036 * steps * (1 + sign * off);
+                const auto run = hand_over(disc, Disc::W{v, 0}, {.t_end = 3});
+                ASSERT_EQ(run.outcome, Outcome::reached_end);
+                EXPECT_LT(run.x.norm(), 1e-12) << steps << ' ' << sign * off;
+            }
+        }
+    }
+}
+
+/// A disc whose velocity is set at 1.
+struct KickedDisc : BesideADisc {
+    Disc::W to;
+    [[nodiscard]] static double next_time_event(double t)
+    {
+        return t < 1 ? 1 : std::numeric_limits<double>::infinity();
+    }
+    void time_reset(double, State& x) const { x = {to[0], to[1]}; }
+};
+
+TEST(StaticFriction, ADiscThatIsKickedSlidesAndOneThatIsStoppedIsHeld)
+{
+    using Two = KickedDisc::State;
+    const auto with = [](double load, double at_rest, Disc::W to) {
+        return KickedDisc{
+            {Disc{.load = [load](double) { return Disc::W(load, 0); }, .at_rest = at_rest}}, to};
+    };
+    // From 5 with the rate -1/2 over 2 s; an impulse of 1e-9 stops within 2e-9 s.
+    for (const double at_rest : {0.5, 0.75, 1.0}) {
+        expect_end(run_of(with(0, at_rest, {5, 0}), Two{0, 0}, until(3)), Two{4, 0}, of_steps);
+        expect_end(run_of(with(0, at_rest, {1e-9, 0}), Two{0, 0}, until(3)), Two{0, 0});
+    }
+    // Stopped under a load between the bounds it is held, under one above them it goes on.
+    expect_end(run_of(with(0.7, 1, {0, 0}), Two{1, 0}, until(3)), Two{0, 0});
+    expect_end(run_of(with(1.1, 1, {0, 0}), Two{1, 0}, until(3)), Two{1.2, 0}, of_steps);
+}
+
 TEST(StaticFriction, ADiscStopsUnderASmallLoadAndSlipsAgain)
 {
     // v' = (t - 3)/2 - 1/2 from 1 against a load that turns: at rest where (t - 4)^2 / 4 = 3, held

@@ -244,6 +244,7 @@ public:
         probe_.t = t;
         probe_.w = vector(x);
         if (!select(probe_)) return false;
+        keep_selection();
         to_ = probe_;
         branches = branches_of(to_);
         return true;
@@ -369,6 +370,8 @@ protected:
         }
         return true;
     }
+    /// The next step starts with what has been selected.
+    virtual void keep_selection() {}
     [[nodiscard]] virtual Mode branches_of(const State&) { return 0; }
 
     /// Whether (t, x) is the end of the last step, up to the rounding with which it is accepted.

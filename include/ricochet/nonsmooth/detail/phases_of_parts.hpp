@@ -58,11 +58,15 @@ public:
         located_.change = Change::none;
         for (std::size_t k = 0; k < sizes_.size(); ++k) {
             const auto value = [&] { return held_[k] ? slack(k) : approach(k); };
-            const double high = located_.length;
-            const double at_high = value();
+            const double whole = located_.length;
+            double high = whole, at_high = value();
             if (!(at_high < 0)) continue;
-            const double low = 1e-6 * high;
-            const double at_low = at(low, value);
+            double low = 1e-6 * high;
+            double at_low = at(low, value);
+            if (!held_[k] && at_low < 0) {
+                high = low, at_high = at_low;
+                low *= 1e-3, at_low = at(low, value);
+            }
             double s = low;
             if (at_low > 0) {
                 s = false_position(low, at_low, high, at_high, 0,
@@ -72,7 +76,7 @@ public:
             if (found && (held_[k] || rests(k))) {
                 located_.change = held_[k] ? Change::slip : Change::stop;
                 located_.part = k;
-            } else if (!take_located(high)) {
+            } else if (!take_located(whole)) {
                 return h;
             }
         }
@@ -139,10 +143,11 @@ protected:
         selected_ = none_;
         for (std::size_t k = 0; k < sizes_.size(); ++k) {
             check_bound(k, at);
-            selected_[k] = is_zero(k, at, 64 * std::numeric_limits<double>::epsilon());
+            selected_[k] = is_zero(k, at, negligible) || stays_at_rest(k, at);
         }
         return settle(at, selected_, none_);
     }
+    void keep_selection() override { held_at_end_ = selected_; }
 
 private:
     enum class Change { none, slip, stop };
@@ -246,6 +251,27 @@ private:
         return size_of(k, y) <= fraction * size_of(k, terms);
     }
 
+    /// Whether a part that was held at the end of the last step has been left as it was there.
+    [[nodiscard]] bool stays_at_rest(std::size_t k, const State& at) const
+    {
+        if (!held_at_end_[k] || !(std::abs(at.t - to_.t) <= negligible * std::abs(at.t)))
+            return false;
+        const auto& m = matrices();
+        Reaction there = to_.reaction, here = there;
+        m.observed(to_.t, to_.w, there);
+        m.observed(at.t, at.w, here);
+        const Vector w = at.w.cwiseAbs() + to_.w.cwiseAbs();
+        const Reaction terms = times(m.observe().cwiseAbs(), w);
+        return size_of(k, Reaction(here - there)) <= negligible * size_of(k, terms);
+    }
+    /// Whether the y of a part that moved comes to zero at the end of the step and no farther: up
+    /// to a part of its terms that is above the shortest step in which `reach` looks for a stop,
+    /// 1e-9 of the step, since what is left would pass zero within that.
+    [[nodiscard]] bool arrives(std::size_t k) const
+    {
+        return is_zero(k, to_, 10 * at_rest) && !is_zero(k, from_, at_rest);
+    }
+
     // --- what is held at the end of a step ---
 
     [[nodiscard]] bool settle_end(bool to_end)
@@ -259,7 +285,8 @@ private:
                 fired[k] =
                     (located && located_.change == Change::slip) || size_of(k, to_.reaction) > most;
                 changes = changes || fired[k];
-            } else if ((located && located_.change == Change::stop) || has_stopped(k)) {
+            } else if ((located && located_.change == Change::stop) || has_stopped(k) ||
+                       arrives(k)) {
                 candidates[k] = changes = true;
                 come_to_rest(k, to_);
             }
