@@ -849,6 +849,13 @@ void PhaseRules::save(std::vector<double>& memory) const
     if (has_inclusion()) inclusion().save(memory);
 }
 
+std::size_t PhaseRules::memory_in(const ModeInclusion& of) const
+{
+    std::vector<double> memory;
+    if (of.inclusion) of.inclusion->save(memory);
+    return remembered + sides_.size() + memory.size();
+}
+
 void PhaseRules::restore(const std::vector<double>& memory)
 {
     std::memcpy(static_cast<void*>(&memory_), memory.data(), sizeof memory_);

@@ -245,8 +245,10 @@ public:
     }
     [[nodiscard]] std::uint64_t implicit_steps() const noexcept { return implicit_steps_; }
 
-    // The memory of the rules in the mode in which the run is.
+    // The memory of the rules in the mode in which the run is. It may be shorter than that of the
+    // mode in which another run is that reads it.
     void save(std::vector<double>& memory) const;
+    [[nodiscard]] std::size_t memory_in(const ModeInclusion& of) const;
     void restore(const std::vector<double>& memory);
 
 private:

@@ -68,6 +68,7 @@ public:
         make_kernels(x0.size());
         make_table();
         make_phases();
+        for (const ModeInclusion& of : modes_) memory_ = std::max(memory_, rules_.memory_in(of));
     }
     PhasedSystem(const PhasedSystem&) = delete;
     PhasedSystem& operator=(const PhasedSystem&) = delete;
@@ -454,9 +455,10 @@ private:
     mutable PhaseRules rules_;
     mutable Mode seen_ = std::numeric_limits<Mode>::max();  ///< that the rules are about
     Mode mode_ = 0;                                         ///< of the user's, in which the run is
-    std::size_t reactions_;                                 ///< their number
-    std::size_t guards_;                                    ///< number of the user's
-    std::vector<GuardInfo> infos_;                          ///< of the user's
+    std::size_t memory_ = 0;        ///< numbers of a snapshot, the same in all modes: see `save`
+    std::size_t reactions_;         ///< their number
+    std::size_t guards_;            ///< number of the user's
+    std::vector<GuardInfo> infos_;  ///< of the user's
     std::vector<bool> stands_somewhere_;  ///< guards of the user's that are a y in some mode
     std::vector<bool> has_reaction_;      ///< guards of the user's with a reaction in some mode
     std::vector<std::size_t> own_fired_;
@@ -895,6 +897,7 @@ void PhasedSystem<C>::make_phases()
     t.save = [](void* adapter, std::vector<double>& memory) {
         const PhasedSystem& me = at(adapter);
         me.in(me.mode_).save(memory);
+        memory.resize(std::max(me.memory_, memory.size()));
         memory.push_back(static_cast<double>(me.mode_));
     };
     t.restore = [](void* adapter, const std::vector<double>& memory) {

@@ -280,6 +280,33 @@ TEST(PhasesByMode, AReactionWhoseGuardsAreDisabledIsInactive)
     expect_times(times_at(run.events, 0, EventKind::stick), {3});
 }
 
+TEST(PhasesByMode, ASnapshotOfAModeWithAnInclusionIsRestoredInOneWithout)
+{
+    const Options options = until(4);
+    const auto system = brake();
+    Simulation whole(system, Two{0, 0}, options);
+    std::vector<Snapshot> saved{whole.save()};
+    std::vector<Mode> modes{whole.mode()};
+    while (whole.step()) {
+        saved.push_back(whole.save());
+        modes.push_back(whole.mode());
+    }
+    ASSERT_NE(std::count(modes.begin(), modes.end(), modes.front()),
+              static_cast<std::ptrdiff_t>(modes.size()));
+    // Into a simulation at its start and into one at its end, which is in the other mode or not.
+    for (const Snapshot& snapshot : saved) {
+        Simulation fresh(system, Two{0, 0}, options);
+        fresh.restore(snapshot);
+        while (fresh.step()) {
+        }
+        EXPECT_EQ(fresh.x(), whole.x());
+        fresh.restore(snapshot);
+        while (fresh.step()) {
+        }
+        EXPECT_EQ(fresh.x(), whole.x());
+    }
+}
+
 // --- bad input ---
 
 TEST(PhasesByMode, AReactionThatTheInclusionDoesNotHaveIsRefused)
