@@ -281,22 +281,36 @@ bool ContactIsland::set_rebounds(double h)
     return true;
 }
 
+/// [J] Kinetic energy of the difference of two velocities of all bodies.
+double ContactIsland::energy_between(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const
+{
+    double sum = 0;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+        const auto k = 2 * static_cast<Eigen::Index>(i);
+        sum += 0.5 * bodies_[i].mass * (a.segment<2>(k) - b.segment<2>(k)).squaredNorm();
+    }
+    return sum;
+}
+
+/// [J] Work of the impulses p of pressed contacts at the velocities of the end of a step of length
+/// h.
+double ContactIsland::work_of(const Eigen::VectorXd& p, double h) const
+{
+    double sum = 0;
+    for (std::size_t k = 0; k < touches_.size(); ++k) {
+        const auto i = 2 * static_cast<Eigen::Index>(k);
+        if (!(p[i] > 0)) continue;
+        const auto u = ContactLaw::relative(closed_contact(touches_[k], h), v_next_);
+        sum += p[i] * u.normal + p[i + 1] * u.tangential;
+    }
+    return sum;
+}
+
 /// [J] Energy lost in a step of length h, seen from walls that move; that lost by drag and springs
 /// is not counted.
 double ContactIsland::lost(double h) const
 {
-    double lost = 0;
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
-        const auto k = 2 * static_cast<Eigen::Index>(i);
-        lost += 0.5 * bodies_[i].mass * (v_next_.segment<2>(k) - v_.segment<2>(k)).squaredNorm();
-    }
-    for (std::size_t k = 0; k < touches_.size(); ++k) {
-        const auto i = 2 * static_cast<Eigen::Index>(k);
-        if (!(impulses_[i] > 0)) continue;
-        const auto u = ContactLaw::relative(closed_contact(touches_[k], h), v_next_);
-        lost -= impulses_[i] * u.normal + impulses_[i + 1] * u.tangential;
-    }
-    return lost;
+    return energy_between(v_next_, v_) - work_of(impulses_, h);
 }
 
 /// The largest part of impulses p, which lead from the velocities of the step's end to v, with
@@ -304,18 +318,9 @@ double ContactIsland::lost(double h) const
 double ContactIsland::allowed_part(const Eigen::VectorXd& p, const Eigen::VectorXd& v,
                                    double h) const
 {
-    double linear = 0;  // gained with the part theta: theta linear + theta^2 square
-    double square = 0;
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
-        const auto k = 2 * static_cast<Eigen::Index>(i);
-        square += 0.5 * bodies_[i].mass * (v.segment<2>(k) - v_next_.segment<2>(k)).squaredNorm();
-    }
-    for (std::size_t k = 0; k < touches_.size(); ++k) {
-        const auto i = 2 * static_cast<Eigen::Index>(k);
-        if (!(p[i] > 0)) continue;
-        const auto u = ContactLaw::relative(closed_contact(touches_[k], h), v_next_);
-        linear += p[i] * u.normal + p[i + 1] * u.tangential;
-    }
+    // Gained with the part theta: theta linear + theta^2 square.
+    const double linear = work_of(p, h);
+    const double square = energy_between(v, v_next_);
     const double most = lost(h);
     if (linear + square <= most) return 1;
     if (!(most > 0)) return 0;

@@ -175,6 +175,8 @@ private:
     void rebound(double h);
     [[nodiscard]] bool set_rebounds(double h);
     [[nodiscard]] LawContact closed_contact(const Touch& touch, double h) const;
+    [[nodiscard]] double energy_between(const Eigen::VectorXd& a, const Eigen::VectorXd& b) const;
+    [[nodiscard]] double work_of(const Eigen::VectorXd& p, double h) const;
     [[nodiscard]] double lost(double h) const;
     [[nodiscard]] double allowed_part(const Eigen::VectorXd& p, const Eigen::VectorXd& v,
                                       double h) const;
