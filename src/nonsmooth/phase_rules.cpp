@@ -22,7 +22,7 @@ PhaseRules::PhaseRules(const BranchPhases& any, bool by_mode, const PhaseOptions
       by_mode_(by_mode),
       options_(options)
 {
-    for (auto* numbers : {&sides_, &y_, &y_before_, &lower_, &upper_, &rates_}) {
+    for (auto* numbers : {&sides_, &at_bound_, &y_, &y_before_, &lower_, &upper_, &rates_}) {
         numbers->assign(count_, 0);
     }
     flow_.assign(size_, 0);
@@ -208,6 +208,7 @@ Kind PhaseRules::enter(double t, double* x)
         kind = determined_kind(at, b, t, x, PhaseCause::start);
     }
     note_sides(t, x);
+    note_bounds(kind, t, x);
     note(kind, t, options_.alone && is_implicit(kind) ? cause_ : PhaseCause::start);
     begins_ = true;
     return kind_ = kind;
@@ -249,6 +250,7 @@ Kind PhaseRules::enter_mode(Kind before, double t, double* x)
     }
     if (kind != before && kind != over()) note(kind, t, cause_);
     note_sides(t, x);
+    note_bounds(kind, t, x);
     return kind;
 }
 
@@ -291,6 +293,13 @@ Kind PhaseRules::kind_for(Mode b, double t, const double* x, PhaseCause cause)
     if (b == several) return go_by_steps(PhaseCause::several, t, x);
     if (b == several + 1) return go_by_steps(PhaseCause::no_flow, t, x);
     inclusion().note_faulty(t, x);
+    reason_ = fmt::format("at t = {} the bounds of a reaction form no interval", t);
+    return end_with(Outcome::not_converged);
+}
+
+Kind PhaseRules::end_without_reaction(double t)
+{
+    reason_ = fmt::format("at t = {} no reaction with which the motion could go on was found", t);
     return end_with(Outcome::not_converged);
 }
 
@@ -308,8 +317,13 @@ Kind PhaseRules::go_by_steps(PhaseCause cause, double t, const double* x)
     cause_ = cause;
     Mode b = 0;
     const bool events_only = options_.alone && options_.alone->events_only;
-    if (events_only || inclusion().keeps_to_branches()) return end_with(Outcome::not_handed_over);
-    if (!inclusion().select(t, x, b)) return end_with(Outcome::not_converged);
+    if (events_only || inclusion().keeps_to_branches()) {
+        reason_ = fmt::format("implicit steps are due at t = {} ({}), {}", t, name(cause),
+                              events_only ? "and events_only excludes them"
+                                          : "and they do not know static bounds");
+        return end_with(Outcome::not_handed_over);
+    }
+    if (!inclusion().select(t, x, b)) return end_without_reaction(t);
     memory_.across = b;
     return chatters ? across() : implicit_in(b);
 }
@@ -328,6 +342,8 @@ Kind PhaseRules::decide(const Set& set, double* x)
     if (set.kind == over()) return over();
     reason_.clear();
     if (!has_inclusion()) return own;
+    // The loop ends the run.
+    if (!std::all_of(x, x + size_, [](double c) { return std::isfinite(c); })) return set.kind;
     inclusion().observe(set.t, set.before, y_before_.data());
     inclusion().observe(set.t, x, y_.data());
     cause_ = PhaseCause::held;
@@ -344,6 +360,7 @@ Kind PhaseRules::decide(const Set& set, double* x)
         note(next, set.t, is_set_valued(next) && !by_steps ? PhaseCause::held : cause_);
     }
     note_sides(set.t, x);
+    note_bounds(next, set.t, x);
     return next;
 }
 
@@ -449,7 +466,7 @@ Kind PhaseRules::decide_implicit(const Set& set, double* x)
         b = BranchPhases::with_branch(i, stays ? Branch::inside : Branch::lower, b);
     }
     inclusion().hold(b, set.t, x);
-    if (!inclusion().select(set.t, x, b)) return end_with(Outcome::not_converged);
+    if (!inclusion().select(set.t, x, b)) return end_without_reaction(set.t);
     memory_.across = b;
     return set.kind == across() ? across() : implicit_in(b);
 }
@@ -594,6 +611,13 @@ void PhaseRules::note_sides(double t, const double* x)
     }
 }
 
+void PhaseRules::note_bounds(Kind kind, double t, const double* x)
+{
+    is_at_bound_ =
+        holds(kind) && inclusion().at_bounds(branches_of(kind), t, x, at_bound_.data());
+    if (!is_at_bound_) std::fill(at_bound_.begin(), at_bound_.end(), 0.0);
+}
+
 void PhaseRules::note(Kind kind, double t, PhaseCause cause)
 {
     memory_.contradicts = 0;
@@ -649,9 +673,13 @@ PhaseRules::Verdict PhaseRules::review(const Step& step, double* x)
     if (begins && is_implicit(step.kind)) {
         return {PhaseVerdict::Kind::changes, step.kind, options_.step};
     }
-    if (has_own_guards(step.kind)) return review_own(step, x);
-    if (is_explicit(step.kind)) return review_explicit(step.kind, step.t, x);
-    return review_implicit(step, x);
+    const Verdict verdict = has_own_guards(step.kind) ? review_own(step, x)
+                            : is_explicit(step.kind)
+                                ? review_explicit(step.kind, step.t, x)
+                                : review_implicit(step, x);
+    const bool changes = verdict.what == PhaseVerdict::Kind::changes;
+    if (changes || is_at_bound_) note_bounds(changes ? verdict.kind : step.kind, step.t, x);
+    return verdict;
 }
 
 bool PhaseRules::may_arrive(const Step& step, double reach)
@@ -734,7 +762,11 @@ PhaseRules::Verdict PhaseRules::review_implicit(const Step& step, double* x)
     if (step.has_advanced) {
         ++memory_.steps;
         ++implicit_steps_;
-        if (inclusion().law() > 1e-6) {
+        if (const double law = inclusion().law(); law > 1e-6) {
+            reason_ = fmt::format(
+                "the reactions at the end of the implicit step to t = {} violate their law by {}, "
+                "as a fraction of the forces; expected at most 1e-6",
+                t, law);
             return {PhaseVerdict::Kind::ends, kind, 0, Outcome::law_violated};
         }
     }
@@ -785,11 +817,19 @@ PhaseRules::Verdict PhaseRules::ask(const End& end, double* x, PhaseCause cause)
 
 PhaseRules::Verdict PhaseRules::give_up(const End& end, double* x)
 {
+    const Verdict verdict = after_end(end, x);
+    if (verdict.what == PhaseVerdict::Kind::changes) note_bounds(verdict.kind, end.t, x);
+    return verdict;
+}
+
+PhaseRules::Verdict PhaseRules::after_end(const End& end, double* x)
+{
     kind_ = end.kind;
     reason_.clear();
     if (is_implicit(end.kind)) {
         const bool unsolved = end.outcome == Outcome::non_finite;
         if (!unsolved || end.which != no_guard || !end.of_phases) return {};
+        reason_ = fmt::format("a stage of the implicit step from t = {} has no solution", end.t);
         return {PhaseVerdict::Kind::ends, end.kind, 0, Outcome::not_converged};
     }
     const auto cause = cause_after(end.outcome);
@@ -800,6 +840,8 @@ PhaseRules::Verdict PhaseRules::give_up(const End& end, double* x)
         // A guard with a reaction asks that one alone.
         if (end.reaction != no_reaction && is_clear(end.reaction, y_[end.reaction], x)) return {};
         if (end.t == memory_.gave_up_at) {
+            reason_ = fmt::format("the inclusion has decided at t = {}, and the motion ends there again ({})",
+                                  end.t, name(end.outcome));
             return {PhaseVerdict::Kind::ends, end.kind, 0, Outcome::not_handed_over};
         }
         memory_.gave_up_at = end.t;
@@ -846,6 +888,7 @@ void PhaseRules::save(std::vector<double>& memory) const
     memory.resize(remembered);
     std::memcpy(memory.data(), &memory_, sizeof memory_);
     memory.insert(memory.end(), sides_.begin(), sides_.end());
+    memory.insert(memory.end(), at_bound_.begin(), at_bound_.end());
     if (has_inclusion()) inclusion().save(memory);
 }
 
@@ -853,15 +896,17 @@ std::size_t PhaseRules::memory_in(const ModeInclusion& of) const
 {
     std::vector<double> memory;
     if (of.inclusion) of.inclusion->save(memory);
-    return remembered + sides_.size() + memory.size();
+    return remembered + 2 * count() + memory.size();
 }
 
 void PhaseRules::restore(const std::vector<double>& memory)
 {
     std::memcpy(static_cast<void*>(&memory_), memory.data(), sizeof memory_);
     const double* const sides = memory.data() + remembered;
-    std::copy_n(sides, sides_.size(), sides_.begin());
-    if (has_inclusion()) inclusion().restore(std::span(memory).subspan(remembered + sides_.size()));
+    std::copy_n(sides, count(), sides_.begin());
+    std::copy_n(sides + count(), count(), at_bound_.begin());
+    is_at_bound_ = std::any_of(at_bound_.begin(), at_bound_.end(), [](double r) { return r > 0; });
+    if (has_inclusion()) inclusion().restore(std::span(memory).subspan(remembered + 2 * count()));
     reason_.clear();
     const auto listed = static_cast<std::size_t>(memory_.listed);
     if (phases_->size() > listed) phases_->resize(listed);

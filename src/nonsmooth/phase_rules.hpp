@@ -136,6 +136,26 @@ public:
                                     const double* dxdt) const;
     void guard_rates(Kind kind, double t, const double* x, const double* dxdt,
                      std::span<double> rates) const;
+    /// Whether a reaction is held at its bound. It may stay there for any time, and where it leaves
+    /// is an event: until then the room that it has, which is zero, counts as inside.
+    [[nodiscard]] bool is_at_bound() const noexcept { return is_at_bound_; }
+    /// The room of a held reaction as a guard: far from zero where it is zero up to rounding.
+    [[nodiscard]] double room_at_bound(std::size_t i, double room) const noexcept
+    {
+        return std::fabs(room) <= at_bound_[i] ? at_bound_[i] * 0x1p40 : room;
+    }
+    /// The same for one of the guards, and for all of them.
+    [[nodiscard]] double guard_at_bound(std::size_t which, double g) const noexcept
+    {
+        const std::size_t kind = kind_of_guard(which);
+        return kind == 2 || kind == 3 ? room_at_bound(reaction_of(which), g) : g;
+    }
+    void set_guards_at_bound(std::span<double> g) const noexcept
+    {
+        for (std::size_t which = 0; which < g.size(); ++which) {
+            g[which] = guard_at_bound(which, g[which]);
+        }
+    }
     /// Sets the numbers of the guards that watch own phases.
     void fill_watching(std::span<double> numbers, double to) const noexcept
     {
@@ -211,6 +231,7 @@ public:
     {
         const bool may_let_go = !options_.alone || options_.alone->until_released;
         if (begins_ || is_approach(kind) || (may_let_go && !inclusion.holds(b))) return false;
+        if (is_at_bound_) return false;
         if (memory_.contradicts != 0 || memory_.fluttering > most_flutters) return false;
         if (memory_.events >= memory_.marked_events + most_events) return false;
         if (stall_.is_due(steps_ + has_advanced)) return false;
@@ -341,12 +362,15 @@ private:
         return over();
     }
 
+    [[nodiscard]] Kind end_without_reaction(double t);
+
     /// The reactions where the system's own flow is followed: at the bounds on the side of y.
     void reaction_of_own(double t, const double* x, double* r);
 
     void note_changes(const Set& set, Mode before, Kind next, const double* x);
     void note_flutter(const Set& set, Kind next, const double* x);
     void note_sides(double t, const double* x);
+    void note_bounds(Kind kind, double t, const double* x);
     void note(Kind kind, double t, PhaseCause cause);
     [[nodiscard]] bool chatters(double t) noexcept;
 
@@ -366,6 +390,7 @@ private:
         const bool low = BranchPhases::branch(i, b) == Branch::lower;
         return BranchPhases::with_branch(i, low ? Branch::upper : Branch::lower, b);
     }
+    [[nodiscard]] Verdict after_end(const End& end, double* x);
     [[nodiscard]] Verdict ask(const End& end, double* x, PhaseCause cause);
     [[nodiscard]] Verdict review_own(const Step& step, const double* x);
     [[nodiscard]] Verdict review_explicit(Kind kind, double t, double* x);
@@ -393,6 +418,9 @@ private:
     Memory memory_;
     std::vector<double> sides_;         ///< sign of each y when it was last not zero
     std::vector<double> sides_before_;  ///< at the last set
+    /// Rounding of each reaction that is held at its bound, and 0 for the others.
+    std::vector<double> at_bound_;
+    bool is_at_bound_ = false;  ///< there are some
     std::vector<double> y_, y_before_, lower_, upper_, rates_, flow_;
     std::vector<bool> arrived_;
     std::vector<std::size_t> kept_;

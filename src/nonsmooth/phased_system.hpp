@@ -190,6 +190,7 @@ private:
         if (!by.inclusion) return in(own_mode(mode)).guards(kind_of(mode), t, x, g);
         rules_.fill_watching(g, 1);
         by.inclusion->guards(by.branches, t, x, g.data(), rules_.guards_of_reaction());
+        if (rules_.is_at_bound()) rules_.set_guards_at_bound(g);
     }
     [[nodiscard]] double guard(std::size_t i, Mode mode, double t, const C& x) const
     {
@@ -199,7 +200,8 @@ private:
         if (!by.inclusion || rules_.watches_own(which)) {
             return in(own_mode(mode)).guard(which, t, x.data());
         }
-        return by.inclusion->guard(rules_.in_branches(which), by.branches, t, x.data());
+        const double g = by.inclusion->guard(rules_.in_branches(which), by.branches, t, x.data());
+        return rules_.is_at_bound() ? rules_.guard_at_bound(which, g) : g;
     }
     [[nodiscard]] double rate(GuardInMode of, ScaledTime time, const C& x, const C& dxdt) const
     {

@@ -179,6 +179,18 @@ public:
                (terms_.holds[mask_of(mode)].largest * free + r.template lpNorm<Eigen::Infinity>());
     }
 
+    /// By how much a held reaction has to be beyond its bound to be released: more than the
+    /// rounding that `settle` forgives.
+    [[nodiscard]] double rounding_at_bound(Mode mode, const Motion& motion) const
+    {
+        const Reaction& r = motion.reaction;
+        const Vector free = motion.rate - times(terms_.lever, r);
+        const double y = times(terms_.observe, free).template lpNorm<Eigen::Infinity>();
+        const double of_y = negligible * (terms_.holds[mask_of(mode)].largest * y +
+                                          r.template lpNorm<Eigen::Infinity>());
+        return 2 * std::max(of_y, rounding_of_held(mode, motion.rate, r));
+    }
+
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
     {
         return guard(which, mode, t, vector(x));

@@ -49,7 +49,8 @@ public:
     {
     }
 
-    /// Starts from the end of an earlier run, with its reaction.
+    /// Starts from the end of an earlier run, with its time, whatever `options.t_start` is, and its
+    /// reaction.
     /// @throws std::invalid_argument also if the reaction lies outside the set.
     HandOver(const System& system, const Run<Vector>& earlier, const HandOverOptions& options)
         : HandOver(system, State{earlier.t, earlier.x, reaction_of(earlier)}, options)

@@ -152,6 +152,10 @@ public:
                                      double* x) const = 0;
     /// Whether the reactions that b holds are inside their bounds.
     [[nodiscard]] virtual bool stays_held(Mode b, double t, const double* x) const = 0;
+    /// Writes for every reaction that is held at one of its bounds, up to rounding, that rounding,
+    /// and 0 for the others. Returns whether there are any.
+    [[nodiscard]] virtual bool at_bounds(Mode b, double t, const double* x,
+                                         double* rounding) const = 0;
     [[nodiscard]] virtual bool flows(Mode b) const noexcept = 0;
     virtual void flow(Mode b, double t, const double* x, double* dxdt) const = 0;
     /// Steps in branches b by a method that holds the state in registers, until the next call;

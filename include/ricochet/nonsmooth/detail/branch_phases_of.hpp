@@ -163,6 +163,23 @@ public:
         modes_.rooms(b, t, vector(x), motion, rooms);
         return *std::min_element(rooms.begin(), rooms.end()) >= 0;
     }
+    [[nodiscard]] bool at_bounds(Mode b, double t, const double* x,
+                                 double* rounding) const override
+    {
+        typename Modes::Motion motion;
+        typename Modes::Rooms rooms;
+        modes_.rooms(b, t, vector(x), motion, rooms);
+        const double doubt = modes_.rounding_at_bound(b, motion);
+        bool any = false;
+        for (std::size_t i = 0; i < reactions(); ++i) {
+            // One that has a single value has no motion to be released to.
+            const auto [near, far] = std::minmax(rooms[2 * i], rooms[2 * i + 1]);
+            const bool is_at_bound = std::fabs(near) <= doubt && far > doubt;
+            rounding[i] = is_at_bound ? doubt : 0;
+            any = any || is_at_bound;
+        }
+        return any;
+    }
     [[nodiscard]] bool flows(Mode b) const noexcept override { return modes_.flows(b); }
     void flow(Mode b, double t, const double* x, double* dxdt) const override
     {
@@ -401,8 +418,9 @@ private:
         typename Modes::Motion motion;
         typename Modes::Rooms before;
         modes_.rooms(b, t0, w0, motion, before);
+        const double rounding = modes_.rounding_at_bound(b, motion);
         for (std::size_t k = 0; k < rooms.size(); ++k) {
-            if (rooms[k] < 0 && !(before[k] > 0)) return false;
+            if (rooms[k] < 0 && !(before[k] >= -rounding)) return false;
         }
         return true;
     }

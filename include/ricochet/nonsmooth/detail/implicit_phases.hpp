@@ -192,6 +192,10 @@ public:
         return b;
     }
     [[nodiscard]] bool stays_held(Mode, double, const double*) const override { return true; }
+    [[nodiscard]] bool at_bounds(Mode, double, const double*, double*) const override
+    {
+        return false;
+    }
     [[nodiscard]] bool flows(Mode) const noexcept override { return false; }
     void flow(Mode, double, const double*, double* dxdt) const override
     {

@@ -25,7 +25,7 @@ namespace ricochet::detail {
 
 [[noreturn]] inline void refuse_bounds(Eigen::Index i, const char* what, double one, double other)
 {
-    throw std::invalid_argument("inclusion: reaction " + std::to_string(i) + ": " + what + ", " +
+    throw std::invalid_argument("inclusion: reaction " + std::to_string(i) + ": " + what + " " +
                                 std::to_string(one) + " and " + std::to_string(other));
 }
 
@@ -178,7 +178,7 @@ Mode AnyModes<N, M>::settle_static(Branches at, std::size_t fired, double t, con
             const double located = fired >> i & 1 ? 1e-9 * loads.most[i] : 0;
             const double doubt = std::max(rounding, located);
             const bool leaves =
-                beyond > doubt || (beyond >= -doubt && room_falls(i, r[i] > 0, mode, t, w));
+                beyond > rounding || (beyond >= -doubt && room_falls(i, r[i] > 0, mode, t, w));
             if (!leaves) continue;
             const double before = std::copysign(1.0, r[i]) * from[i];
             const double way = std::abs(r[i]) - before;
