@@ -208,7 +208,8 @@ inline bool EventEngine<X, single>::changes_nothing()
     if (cuts_at_all_ || resets_.stops()) return false;
     if (resets_.mode() != step_.mode() || resets_.conflict().first != no_guard) return false;
     for (const std::size_t i : search_.fired()) {
-        // The phases may have decided that a reaction at its bound is held on, from where it is now.
+        // The phases may have decided that a reaction at its bound is held on, from where it is
+        // now.
         if (guards_[i].info.unilateral || is_of_phases(i) || ends_run(i)) return false;
     }
     return same_state(resets_.after(), search_.before());

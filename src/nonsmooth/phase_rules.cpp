@@ -318,9 +318,9 @@ Kind PhaseRules::go_by_steps(PhaseCause cause, double t, const double* x)
     Mode b = 0;
     const bool events_only = options_.alone && options_.alone->events_only;
     if (events_only || inclusion().keeps_to_branches()) {
-        reason_ = fmt::format("implicit steps are due at t = {} ({}), {}", t, name(cause),
-                              events_only ? "and events_only excludes them"
-                                          : "and they do not know static bounds");
+        reason_ = fmt::format(
+            "implicit steps are due at t = {} ({}), {}", t, name(cause),
+            events_only ? "and events_only excludes them" : "and they do not know static bounds");
         return end_with(Outcome::not_handed_over);
     }
     if (!inclusion().select(t, x, b)) return end_without_reaction(t);
@@ -613,8 +613,7 @@ void PhaseRules::note_sides(double t, const double* x)
 
 void PhaseRules::note_bounds(Kind kind, double t, const double* x)
 {
-    is_at_bound_ =
-        holds(kind) && inclusion().at_bounds(branches_of(kind), t, x, at_bound_.data());
+    is_at_bound_ = holds(kind) && inclusion().at_bounds(branches_of(kind), t, x, at_bound_.data());
     if (!is_at_bound_) std::fill(at_bound_.begin(), at_bound_.end(), 0.0);
 }
 
@@ -674,9 +673,8 @@ PhaseRules::Verdict PhaseRules::review(const Step& step, double* x)
         return {PhaseVerdict::Kind::changes, step.kind, options_.step};
     }
     const Verdict verdict = has_own_guards(step.kind) ? review_own(step, x)
-                            : is_explicit(step.kind)
-                                ? review_explicit(step.kind, step.t, x)
-                                : review_implicit(step, x);
+                            : is_explicit(step.kind)  ? review_explicit(step.kind, step.t, x)
+                                                      : review_implicit(step, x);
     const bool changes = verdict.what == PhaseVerdict::Kind::changes;
     if (changes || is_at_bound_) note_bounds(changes ? verdict.kind : step.kind, step.t, x);
     return verdict;
@@ -840,8 +838,9 @@ PhaseRules::Verdict PhaseRules::after_end(const End& end, double* x)
         // A guard with a reaction asks that one alone.
         if (end.reaction != no_reaction && is_clear(end.reaction, y_[end.reaction], x)) return {};
         if (end.t == memory_.gave_up_at) {
-            reason_ = fmt::format("the inclusion has decided at t = {}, and the motion ends there again ({})",
-                                  end.t, name(end.outcome));
+            reason_ = fmt::format(
+                "the inclusion has decided at t = {}, and the motion ends there again ({})", end.t,
+                name(end.outcome));
             return {PhaseVerdict::Kind::ends, end.kind, 0, Outcome::not_handed_over};
         }
         memory_.gave_up_at = end.t;

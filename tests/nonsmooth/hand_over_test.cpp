@@ -471,6 +471,7 @@ TEST(HandOver, NamesTheReactionWhoseSetIsEmpty)
     EXPECT_EQ(run.outcome, Outcome::not_converged);
     EXPECT_NEAR(run.t, 0.5, 1e-9);
     EXPECT_EQ(run.failure.set, 1);
+    EXPECT_NE(run.reason.find("form no interval"), std::string::npos) << run.reason;
     EXPECT_NEAR(run.x[0], 2.5, 1e-8);
 }
 

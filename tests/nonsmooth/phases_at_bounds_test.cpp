@@ -59,8 +59,8 @@ std::vector<Case> cases()
     for (const double bound : {1.0, 0.3}) {
         out.push_back({bound, [](double t) { return std::max(0.0, t - 1); }, 1, 0.5, 1e-13});
         out.push_back({bound, [](double t) { return std::pow(t - 1, 3); }, 1, 0.25, 5e-5});
-        out.push_back({bound, [](double t) { return std::pow(std::max(0.0, t - 1), 2); }, 1,
-                       1.0 / 3, 5e-7});
+        out.push_back(
+            {bound, [](double t) { return std::pow(std::max(0.0, t - 1), 2); }, 1, 1.0 / 3, 5e-7});
         out.push_back({bound, [](double t) { return t * t * t; }, 0, 4, 5e-5});
     }
     return out;

@@ -69,6 +69,38 @@ TEST(PhasesEnds, SeveralMotionsEndARunOfTheInclusionAloneToo)
     EXPECT_NEAR(passed.x[0], 4, exact_motion);
 }
 
+/// A block that friction holds, until its speed is set to something that is no number at 1.
+struct SpoiltAtOne {
+    using State = One;
+    struct Friction {
+        static constexpr int state_size = 1, reaction_size = 1;
+        using Vector = Eigen::Matrix<double, 1, 1>;
+        static void smooth(double, const Vector&, Vector& f) { f[0] = 0.5; }
+        [[nodiscard]] static sets::Box<1> reaction_set(double, const Vector&)
+        {
+            return sets::Box<1>({-1}, {1});
+        }
+    };
+    static void flow(double, const State& x, State& dxdt)
+    {
+        dxdt[0] = 0.5 + (x[0] > 0 ? -1 : x[0] < 0 ? 1 : 0);
+    }
+    static double next_time_event(double t)
+    {
+        return t < 1 ? 1 : std::numeric_limits<double>::infinity();
+    }
+    static void time_reset(double, State& x) { x[0] = std::numeric_limits<double>::quiet_NaN(); }
+    static Friction set_valued() { return {}; }
+};
+
+TEST(PhasesEnds, AResetThatIsNoNumberReleasesNothing)
+{
+    const auto run = integrate(SpoiltAtOne{}, One{0}, until(2));
+    EXPECT_EQ(run.outcome, Outcome::non_finite);
+    EXPECT_EQ(run.t, 1);
+    EXPECT_EQ(times_of(run.events, EventKind::slip).size(), 0u);
+}
+
 // --- sets that are faulty at the start, where the system's own flow is followed ---
 
 /// w_i' = -Sgn w_i with given bounds of the last reaction.

@@ -439,8 +439,10 @@ struct InAPlane {
 
 TEST(StaticFriction, ReactionsThatAreCombinationsOfOthersEndTheRunWithItsReason)
 {
-    EXPECT_EQ(hand_over(InAPlane{}, InAPlane::W(0, 0), {.t_end = 1}).outcome,
-              Outcome::not_handed_over);
+    const auto run = hand_over(InAPlane{}, InAPlane::W(0, 0), {.t_end = 1});
+    EXPECT_EQ(run.outcome, Outcome::not_handed_over);
+    EXPECT_EQ(run.reason,
+              "implicit steps are due at t = 0 (no_flow), and they do not know static bounds");
 }
 
 // --- on a plane ---

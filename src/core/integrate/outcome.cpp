@@ -105,7 +105,8 @@ std::string_view describe(Outcome outcome) noexcept
                    "kept, and the next call continues from the last completed step";
         case Outcome::at_rest: return "every element came to rest for good";
         case Outcome::not_handed_over:
-            return "events alone cannot continue the motion, and implicit steps are excluded or would "
+            return "events alone cannot continue the motion, and implicit steps are excluded or "
+                   "would "
                    "not know its static bounds; see run.reason";
         case Outcome::released: return "every reaction is at a bound, as was asked for";
         case Outcome::law_violated:

@@ -163,8 +163,7 @@ public:
         modes_.rooms(b, t, vector(x), motion, rooms);
         return *std::min_element(rooms.begin(), rooms.end()) >= 0;
     }
-    [[nodiscard]] bool at_bounds(Mode b, double t, const double* x,
-                                 double* rounding) const override
+    [[nodiscard]] bool at_bounds(Mode b, double t, const double* x, double* rounding) const override
     {
         typename Modes::Motion motion;
         typename Modes::Rooms rooms;
