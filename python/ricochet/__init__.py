@@ -24,6 +24,7 @@ _LATER = {
     "_fmu": ("Fmu", "FmuRun", "load_fmu"),
     "_gradient": ("Adjoint", "Gradient", "Perceptron", "adjoint", "find_periodic_orbit", "gradient",
                   "monodromy", "sensitivities"),
+    "_guard_network": ("GuardNetwork",),
     "_inclusion": ("Inclusion",),
     "_monitor": ("Cut", "Monitor", "Verdict"),
     "_network": ("Network",),
@@ -38,8 +39,8 @@ globals().update(_READY)  # BouncingBall and the other ready systems
 
 __all__ = [
     "Adjoint", "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified", "Compiled", "Cut",
-    "Ensemble", "Filippov", "Fmu", "FmuRun", "Gradient", "Guard", "Inclusion", "Kind", "Monitor",
-    "Network", "OdeResult", "Perceptron", "Run", "Scene", "SceneKind", "SceneRun", "Simulation",
+    "Ensemble", "Filippov", "Fmu", "FmuRun", "Gradient", "Guard", "GuardNetwork", "Inclusion", "Kind",
+    "Monitor", "Network", "OdeResult", "Perceptron", "Run", "Scene", "SceneKind", "SceneRun", "Simulation",
     "Snapshot", "Solution", "Stop", "System", "Times", "Trained", "Verdict", "adjoint", "certify",
     "ensemble", "every", "find_periodic_orbit", "gradient", "guard", "integrate", "load_fmu",
     "monodromy", "plot", "row_seed", "sensitivities", "solve_ivp", "train_classifier", "train_gate",

@@ -3,6 +3,7 @@
 import os
 
 from . import _ricochet
+from ._guard_network import write_whole
 
 
 class Network(_ricochet.Network):
@@ -38,16 +39,7 @@ class Network(_ricochet.Network):
 
     def save(self, path):
         """Writes a model file. On failure, an existing file is unchanged."""
-        path = os.fspath(path)
-        part = path + (b".part" if isinstance(path, bytes) else ".part")
-        try:
-            with open(part, "wb") as file:
-                file.write(self.to_bytes())
-            os.replace(part, path)
-        except BaseException:
-            if os.path.exists(part):
-                os.remove(part)
-            raise
+        write_whole(path, self.to_bytes())
 
     def __reduce__(self):
         return Network.from_bytes, (self.to_bytes(),)

@@ -112,6 +112,8 @@ class Guard:
                  resets=True, directed=False):
         if isinstance(in_modes, Iterator):  # read for every run
             in_modes = list(in_modes)
+        if rate is None and isinstance(value, Compiled):  # that of a GuardNetwork
+            rate = getattr(value, "rate", None)
         self._functions = dict(value=value, rate=rate, reset=reset, rest=rest, enabled=enabled,
                                speed_bound=speed_bound, acceleration_bound=acceleration_bound,
                                lower_bound=lower_bound, upper_bound=upper_bound)

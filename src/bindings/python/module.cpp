@@ -215,6 +215,7 @@ PYBIND11_MODULE(_ricochet, module)
         .def_property_readonly_static("reset_address", [](const py::object&) {
             return std::bit_cast<std::uintptr_t>(&formula_reset);
         });
+    bind_guard_network(module);
     bind_network(module);
     bind_runs(module);
     bind_monitor(module);
