@@ -5,8 +5,7 @@ import numpy as np
 from . import _progress, _ricochet
 from ._network import set_gate
 from ._ready import Ready
-from ._rows import COUNTS as _COUNTS
-from ._rows import run_rows
+from ._rows import empty_rows, rows_from, run_rows
 from ._run import number_from, numbers_from, set_mode, set_tolerance
 from ._system import System
 
@@ -204,19 +203,8 @@ def _run(name, names, parameters, starts, options, threads, progress=None):
     """Runs rows; executors call it, so all its arguments must be picklable."""
     options = dict(options)
     set_gate(options)
-    found = _ricochet.ensemble(name, names, parameters, starts, options, threads, progress)
-    count, width = starts.shape
-    rows = np.zeros(count, [("outcome", "U24"), ("t", float), ("x", float, (width,)),
-                            ("mode", np.uint32), *((c, np.uint64) for c in _COUNTS)])
-    rows["outcome"] = found["outcome"]
-    rows["t"] = found["t"]
-    rows["x"] = found["x"].reshape(count, width)
-    rows["mode"] = found["mode"]
-    for i, name in enumerate(_COUNTS):
-        rows[name] = found["counts"].reshape(count, len(_COUNTS))[:, i]
-    # A run that was stopped in its last chunk has no outcome.
-    complete = found["complete"] and not (rows["outcome"] == "").any()
-    return Ensemble(rows, found["failures"], bool(complete))
+    found = _ricochet.ready_ensemble(name, names, parameters, starts, options, threads, progress)
+    return Ensemble(rows_from(found, starts.shape[1]), found["failed"], found["complete"])
 
 
 def _joined(parts, starts):
@@ -245,10 +233,7 @@ def _run_by(executor, arguments, options, progress):
             future.cancel()
     if len(parts) == len(futures):
         return _joined(parts, begins)
-    rest = parts[0].rows[:0].copy()
-    rest.resize(total - sum(map(len, parts)))
-    rest["t"] = np.nan
-    rest["x"] = np.nan
+    rest = empty_rows(total - sum(map(len, parts)), starts.shape[1])
     return _joined([*parts, Ensemble(rest, {}, False)], [*begins[:len(parts)], 0])
 
 
@@ -277,9 +262,8 @@ def ensemble(system, table, t_end, *, parameters=None, columns=None, x0=None, th
         Of a ready system, the initial state of components that are not columns; by default
         ``system.start``.
     threads : int
-        By default one for each core that the process may use, and one for systems of one's own,
-        whose threads take turns in the interpreter unless all functions are `Compiled`. The
-        results do not depend on it.
+        By default one for each core that the process may use, and one for systems of one's own
+        that need the interpreter, in which threads take turns. The results do not depend on it.
     executor
         If given, blocks of rows are submitted to it: an executor of `concurrent.futures` or
         `mpi4py.futures`, or a client of `dask.distributed`. The results are the same. To other

@@ -1,5 +1,7 @@
 """Functions as formulas: recorded by calling them with symbols, computed without Python."""
 
+import operator
+
 import numpy as np
 
 from . import _ricochet
@@ -22,7 +24,8 @@ def _apply(inputs, ufunc, method, options):
     given = [np.asarray(x).astype(object) for x in inputs]  # of Python's numbers
     if ufunc in (np.arctan2, np.hypot):
         # NumPy calls these as methods of the first operand, which numbers do not have.
-        tape = next(x._tape for y in given for x in y.flat if isinstance(x, Symbol))
+        tapes = [x._tape for y in given for x in y.flat if isinstance(x, Symbol)]
+        tape = next((tape for tape in tapes if not tape.of_parameters), tapes[0])
         as_symbol = np.frompyfunc(tape.symbol, 1, 1)
         given = [np.asarray(as_symbol(x), dtype=object) for x in given]
     if "out" in options:
@@ -63,12 +66,25 @@ class Symbol:
     __float__ = __int__ = __complex__ = __index__ = _a_number
 
 
+class ParameterSymbol(Symbol):
+    """A parameter of the rows of an ensemble, or an expression of such parameters alone.
+
+    A text made of it would be the same in all rows.
+    """
+
+    __slots__ = ()
+    __repr__ = __str__ = __format__ = _a_number
+
+
 def _binary(name, swapped=False):
     def operation(self, other):
-        a, b = self._index, self._tape.operand(other)
+        tape = self._tape
+        if tape.of_parameters and isinstance(other, Symbol):
+            tape = other._tape
+        a, b = tape.operand(self), tape.operand(other)
         if b is None:
             return NotImplemented
-        return self._tape.add(name, b, a) if swapped else self._tape.add(name, a, b)
+        return tape.add(name, b, a) if swapped else tape.add(name, a, b)
     return operation
 
 
@@ -92,19 +108,24 @@ for _method, _name in dict(arctan2="atan2", hypot="hypot").items():
 
 
 class _Tape:
+    of_parameters = False
+    _symbol = Symbol
+
     def __init__(self):
         self.ops = []
 
     def add(self, name, a=0, b=0, value=0.0):
         self.ops.append((name, a, b, value))
-        return Symbol(self, len(self.ops) - 1)
+        return self._symbol(self, len(self.ops) - 1)
 
     def operand(self, given):
         """The number of an operation, or None."""
         if isinstance(given, Symbol):
-            if given._tape is not self:
+            if given._tape is self:
+                return given._index
+            if self.of_parameters or not given._tape.of_parameters:
                 raise ValueError("formula: found a symbol of another one")
-            return given._index
+            return self.add("parameter", given._tape.column(given._index))._index
         if isinstance(given, np.ndarray) and given.ndim > 0:
             return None
         try:
@@ -117,7 +138,68 @@ class _Tape:
         index = self.operand(given)
         if index is None:
             raise TypeError(f"formula: found {given!r}, expected a number or a symbol")
-        return Symbol(self, index)
+        return self._symbol(self, index)
+
+
+#: What rounds as numbers of Python do, for all rows together.
+_EXACT = {"add": np.add, "subtract": np.subtract, "multiply": np.multiply, "divide": np.divide,
+          "negate": np.negative, "sqrt": np.sqrt}
+#: What is computed for each row as a function of numbers would compute it.
+_EACH = {"power": operator.pow, "atan2": np.arctan2, "hypot": np.hypot, "asin": np.arcsin,
+         "acos": np.arccos, "atan": np.arctan,
+         **{name: getattr(np, name) for name in (
+             "cbrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")}}
+
+
+def _each(function, *operands):
+    """A function of numbers, row by row; NaN where it has no real value."""
+    def value(*numbers):
+        try:
+            return float(function(*numbers))
+        except (ArithmeticError, TypeError):  # complex numbers are no floats
+            return np.nan
+    return np.array([value(*numbers) for numbers in zip(*(x.tolist() for x in operands))])
+
+
+class ParameterTape(_Tape):
+    """The parameters of an ensemble as symbols, and the expressions of them that formulas read."""
+
+    of_parameters = True
+    _symbol = ParameterSymbol
+
+    def __init__(self, count):
+        super().__init__()
+        self.symbols = [self.add("parameter", i) for i in range(count)]
+        self._columns = {}  # of the table, by operation
+
+    def column(self, index):
+        """The column of the table with an operation's values."""
+        return self._columns.setdefault(index, len(self._columns))
+
+    def table(self, parameters):
+        """The table of the formulas, shape (rows, columns), and whether all its numbers are finite.
+
+        ``parameters`` are columns. A row with a number that is not finite may fail in Python.
+        """
+        values = []
+        fine = np.ones(len(parameters[0]), bool)
+        with np.errstate(all="ignore"):
+            for name, a, b, value in self.ops:
+                if name == "parameter":
+                    values.append(parameters[a])
+                elif name == "constant":
+                    values.append(np.full(len(fine), value))
+                else:
+                    of = (values[a], values[b]) if name in _OF_TWO else (values[a],)
+                    values.append(_EXACT[name](*of) if name in _EXACT else _each(_EACH[name], *of))
+                fine &= np.isfinite(values[-1])
+        table = np.empty((len(fine), len(self._columns)))
+        for index, column in self._columns.items():
+            table[:, column] = values[index]
+        return table, fine
+
+
+_OF_TWO = ("add", "subtract", "multiply", "divide", "power", "atan2", "hypot")
 
 
 def _recording(components):
@@ -146,9 +228,6 @@ class Formula:
             result = _called(function, modes, mode, t, x, args)
             tapes.append((tape.ops, self._outputs(tape, result, components, title, is_flow)))
         self._ricochet_formula = _ricochet.Formula(components, tapes)
-        address = "flow_address" if is_flow else "guard_address"
-        self._ricochet_address = getattr(_ricochet.Formula, address)
-        self._ricochet_user = self._ricochet_formula.address
 
     @classmethod
     def of_reset(cls, function, components, modes, within, args, title):
@@ -171,8 +250,6 @@ class Formula:
             following.append(number if modes is None else modes.index(after))
             tapes.append((tape.ops, cls._outputs(tape, place, components, title, True)))
         self._ricochet_formula = _ricochet.Formula(components, tapes, following)
-        self._ricochet_address = _ricochet.Formula.reset_address
-        self._ricochet_user = self._ricochet_formula.address
         return self
 
     @staticmethod

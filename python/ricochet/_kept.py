@@ -9,6 +9,7 @@ from types import BuiltinFunctionType, CodeType, FunctionType, MethodType, Modul
 import numpy as np
 
 from . import _ricochet
+from ._formula import ParameterSymbol
 
 #: Functions of Python whose results depend on their arguments alone.
 _PURE = {getattr(builtins, name) for name in (
@@ -30,12 +31,17 @@ class _Unknown(Exception):
     """Something whose changes cannot be seen."""
 
 
+#: Also of empty cells, and of members that cannot be hashed.
+_CANNOT_KNOW = (_Unknown, TypeError, ValueError, RecursionError)
+
+
 class _Seen(dict):
     """Numbers of the functions that were seen, and the places where something may change."""
 
-    def __init__(self):
+    def __init__(self, of_maker=False):
         super().__init__()
         self.places = []
+        self.of_maker = of_maker  # classes are followed to what makes their objects
 
 
 def _value(x, seen):
@@ -52,7 +58,7 @@ def _value(x, seen):
             seen.places.append((LIST, x, None, tuple(x)))
         return kind, tuple([_value(each, seen) for each in x])
     if kind is FunctionType:
-        return _function(x, seen)
+        return id(x) if seen.of_maker and _is_fixed(x) else _function(x, seen)
     if kind is MethodType:
         return _function(x.__func__, seen), id(x.__self__)
     if kind is np.ndarray:
@@ -65,9 +71,11 @@ def _value(x, seen):
     if isinstance(x, (Enum, EnumMeta)):
         return id(x)
     if isinstance(x, ModuleType):
-        if x.__name__ not in _MODULES:
+        if x.__name__ not in _MODULES and not (seen.of_maker and x.__name__ == "ricochet"):
             raise _Unknown
         return x.__name__
+    if seen.of_maker and kind is type:
+        return _of_class(x, seen)
     if kind is BuiltinFunctionType or kind is np.ufunc or kind is type:
         if x in _PURE or getattr(x, "__module__", None) in _MODULES or kind is np.ufunc:
             return id(x)
@@ -77,6 +85,8 @@ def _value(x, seen):
             raise _Unknown
         seen.places.append((DICT, x, None, dict(x)))
         return kind, tuple([(_value(key, seen), _value(each, seen)) for key, each in x.items()])
+    if kind is ParameterSymbol:
+        return id(x._tape), x._index
     raise _Unknown
 
 
@@ -118,16 +128,16 @@ def _function(function, seen):
         if name in given:
             out.append((name, _value(given[name], seen)))
         else:
-            known = getattr(builtins, name, None)
-            if known is not None and known not in _PURE:
+            known = vars(builtins).get(name)
+            if known is not None and known not in _PURE and not (seen.of_maker and known is super):
                 raise _Unknown
             out.append(name)
     return tuple(out)
 
 
 def _is_fixed(cls):
-    """Whether a class is of this package, or `object`."""
-    return cls is object or cls.__module__.split(".")[0] == "ricochet"
+    """Whether a class or function is of this package, or `object`."""
+    return cls is object or (cls.__module__ or "").split(".")[0] == "ricochet"
 
 
 def _members(owner, seen):
@@ -163,7 +173,7 @@ def fingerprint(functions, owner, args, places=None):
                 count = len(seen)
                 members = _members(owner, seen)
             out.append(members)
-    except (_Unknown, TypeError, ValueError, RecursionError):  # of empty cells, unhashable members
+    except _CANNOT_KNOW:
         return None
     if places is not None:
         places += seen.places
@@ -192,6 +202,20 @@ def places_of_members(owner, values):
             return None
         out.append((TYPE, cls, None, members))
     return out + seen.places
+
+
+def _of_class(cls, seen):
+    """A class by the functions that make its objects."""
+    if cls in _PURE or _is_fixed(cls):
+        return id(cls)
+    out = [id(cls)]
+    for base in cls.__mro__:
+        if _is_fixed(base):
+            return tuple(out)
+        for name in ("__new__", "__init__"):
+            if name in vars(base):
+                out.append(_value(vars(base)[name], seen))
+    raise _Unknown
 
 
 #: Methods that change their object, of lists, dictionaries, sets, files and generators.
@@ -257,3 +281,72 @@ class Kept:
 
     def __deepcopy__(self, memo):
         return Kept()
+
+
+#: Names of what tells a symbol from a number, or one object from another, without an exception.
+_TELLING = frozenset(("isinstance", "type", "issubclass", "callable", "hasattr", "getattr", "id",
+                      "__class__", "__dict__"))
+#: Operations of what does so by catching an exception or by matching a class.
+_CATCHING = frozenset(("SETUP_FINALLY", "PUSH_EXC_INFO", "CHECK_EXC_MATCH", "MATCH_CLASS"))
+#: Operations of what changes something outside of a function.
+_CHANGING_OUTSIDE = frozenset(("STORE_GLOBAL", "STORE_SUBSCR", "DELETE_ATTR", "DELETE_GLOBAL",
+                               "DELETE_SUBSCR", "YIELD_VALUE", "IMPORT_NAME"))
+
+
+@lru_cache(maxsize=1024)
+def _tells(code):
+    """Whether a function may do something else with symbols than with numbers."""
+    return bool(_TELLING.intersection(_names_of(code)) or _CATCHING & _operations_of(code))
+
+
+@lru_cache(maxsize=1024)
+def _sets_others(code):
+    """Whether a function sets anything but attributes of its first argument and its own variables."""
+    before = None
+    for instruction in dis.get_instructions(code):
+        if instruction.opname == "STORE_DEREF" and instruction.argval in code.co_freevars:
+            return True
+        if instruction.opname == "STORE_ATTR":
+            loaded = before.argval if before.opname.startswith("LOAD_FAST") else None
+            if isinstance(loaded, tuple):  # of an instruction that loads two
+                loaded = loaded[-1]
+            if code.co_argcount == 0 or loaded != code.co_varnames[0]:
+                return True
+        before = instruction
+    return any(type(constant) is CodeType and _sets_others(constant) for constant in code.co_consts)
+
+
+def _makes_alone(code):
+    """Whether a function that makes systems changes nothing else, and tells no symbols from numbers."""
+    changing = _CHANGING_OUTSIDE & _operations_of(code) or set(_CHANGING).intersection(_names_of(code))
+    return not (changing or _tells(code) or _sets_others(code))
+
+
+def may_make(maker):
+    """Whether ``maker``, given symbols, does what it does with numbers, and changes nothing but its result.
+
+    False also where that cannot be known.
+    """
+    seen = _Seen(of_maker=True)
+    try:
+        if isinstance(maker, type):
+            _of_class(maker, seen)
+        elif type(maker) is FunctionType:
+            _value(maker, seen)
+        else:
+            return False
+    except _CANNOT_KNOW:
+        return False
+    return all(_makes_alone(function.__code__) for function in seen)
+
+
+def take_symbols(functions, owner):
+    """Whether functions of a system made of symbols do what they do in one made of numbers."""
+    seen = _Seen()
+    try:
+        for function in functions:
+            _value(function, seen)
+        _members(owner, seen)
+    except _CANNOT_KNOW:
+        return False
+    return not any(_tells(function.__code__) for function in seen)

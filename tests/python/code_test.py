@@ -107,6 +107,19 @@ def test_values_by_code_have_the_bits_of_the_interpreter():
 
 
 @needs_code
+def test_parameters_have_the_bits_of_constants():
+    for each in ALL:
+        constants = [value for name, _, _, value in each.ops if name == "constant"]
+        numbers = iter(range(len(constants)))
+        ops = [("parameter", next(numbers), 0, 0.0) if op[0] == "constant" else op for op in each.ops]
+        expected = each.formula(each.outputs).values(each.t, each.x, len(each.outputs), False)
+        formula = _ricochet.Formula(each.components, [(ops, each.outputs)])
+        for by_code in (False, True):
+            found = formula.values(each.t, each.x, len(each.outputs), by_code, constants)
+            assert bits(found) == bits(expected), each.ops
+
+
+@needs_code
 @pytest.mark.parametrize("order", (12, 20))
 def test_series_by_code_have_the_bits_of_the_interpreter(order):
     made, finite = 0, 0

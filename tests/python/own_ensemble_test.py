@@ -1,6 +1,7 @@
 """Ensembles of systems written in Python, in this process and by executors."""
 
 import concurrent.futures
+import itertools
 import multiprocessing
 import pickle
 
@@ -292,3 +293,273 @@ def test_results_become_datasets_of_xarray():
     assert np.array_equal(data["event_t"], balls.event_table["t"])
     ready = ricochet.ensemble(ricochet.BouncingBall, {"height": [1.0, 2.0]}, 1.0).to_xarray()
     assert ready["x"].shape == (2, 2) and "event_t" not in ready
+
+
+# --- systems of formulas, whose rows need no interpreter ---
+
+
+class Drop(Ball):
+    """The same as a formula."""
+
+    formula = 2
+
+    @Ball.floor.reset
+    def floor(self, t, x):
+        return [0.0, -self.bounciness * x[1]]
+
+    @floor.rest
+    def lie(self, t, x):
+        return [0.0, 0.0]
+
+
+class Heater(ricochet.System):
+    """A thermostat with a time constant and a clock; its modes know their parameters, too."""
+
+    modes = ("off", "on")
+    formula = 3
+
+    def __init__(self, power, loss):
+        super().__init__()
+        self.rate = np.sqrt(power) / loss ** 2
+        self.low = 18 + 0.5 * power
+        self.time_events = [0.5, 1.5]
+
+    def flow(self, mode, t, x):
+        heat = self.rate if mode == "on" else 0.0
+        return [heat - 0.3 * x[0], np.cos(self.rate * t), x[1]]
+
+    @ricochet.guard(in_modes=["off"])
+    def cold(self, mode, t, x):
+        return x[0] - self.low
+
+    @cold.reset
+    def cold(self, mode, t, x):
+        return "on", [x[0], x[1] + self.rate, x[2]]
+
+    @ricochet.guard(in_modes=["on"], direction=1)
+    def warm(self, mode, t, x):
+        return x[0] - 20
+
+    @warm.reset
+    def warm(self, mode, t, x):
+        return "off"
+
+    def time_reset(self, mode, t, x):
+        return mode, [x[0], x[1] / self.low, x[2]]
+
+
+class Chain(ricochet.System):
+    """Six components, by functions of parameters alone that are not rounded exactly."""
+
+    formula = 6
+
+    def __init__(self, stiffness=0.7, angle=0.1):
+        super().__init__()
+        self.stiffness = np.sin(stiffness) + stiffness ** 1.5 / np.hypot(angle, 2.0)
+        self.other = -np.arctan2(stiffness, angle)
+
+    def flow(self, t, x):
+        return [*x[3:], self.stiffness * (x[1] - 2 * x[0]), self.stiffness * (x[0] + x[2] - 2 * x[1]),
+                self.other * x[2]]
+
+    @ricochet.guard(direction=0)
+    def middle(self, t, x):
+        return x[1]
+
+    @middle.reset
+    def middle(self, t, x):
+        return [*x[:4], 0.9 * x[4], x[5]]
+
+
+def of_functions(restitution):
+    return ricochet.System(
+        lambda t, x: [x[1], -9.81],
+        [ricochet.Guard(lambda t, x: x[0], unilateral=True, reset=lambda t, x: [0.0, -restitution * x[1]])],
+        formula=2)
+
+
+def nothing_row_by_row(monkeypatch):
+    def refuse(*_):
+        raise AssertionError("a row was run by itself")
+    monkeypatch.setattr(ricochet._rows, "run_each", refuse)
+
+
+def row_by_row(system, starts, t_end, parameters, **options):
+    """The same ensemble of systems that are made for each row."""
+    class Unknown:  # nobody knows what it does with symbols
+        def __call__(self, *given, **named):
+            return system(*given, **named)
+    return ricochet.ensemble(Unknown(), starts, t_end, parameters=parameters, **options)
+
+
+CASES = [
+    (Drop, np.column_stack([np.linspace(1, 9, 30), np.zeros(30)]),
+     {"restitution": np.linspace(0.3, 0.9, 30), "gravity": np.linspace(5, 15, 30)}),
+    (of_functions, [3.0, 0.5], np.linspace(0.3, 0.9, 30)),
+    (Heater, [19.0, 0.1, 0.0], {"loss": np.linspace(0.4, 0.8, 30), "power": np.linspace(1, 3, 30)}),
+    (Chain, np.linspace(0, 1, 180).reshape(30, 6), {"stiffness": np.linspace(0.5, 3, 30)}),
+]
+
+
+@pytest.mark.parametrize("system, starts, parameters", CASES)
+@pytest.mark.parametrize("options", [
+    {}, {"method": "taylor"}, {"method": "rosenbrock4", "rtol": 1e-5}, {"detector": "ends"},
+    {"method": "rk4", "fixed": True, "step": 0.01}, {"sample_times": [0.0, 1.0, 2.5], "atol": 1e-10}])
+def test_formulas_of_all_rows_have_the_bits_of_each(system, starts, parameters, options, monkeypatch):
+    expected = content(row_by_row(system, starts, 3.0, parameters, **options))
+    with concurrent.futures.ProcessPoolExecutor(2, multiprocessing.get_context("fork")) as executor:
+        by_processes = ricochet.ensemble(system, starts, 3.0, parameters=parameters,
+                                         executor=executor, **options)
+    assert content(by_processes) == expected
+    nothing_row_by_row(monkeypatch)
+    for threads in (None, 1, 3):
+        found = ricochet.ensemble(system, starts, 3.0, parameters=parameters, threads=threads, **options)
+        assert content(found) == expected and len(found.event_table) > 0
+
+
+def test_rows_that_formulas_cannot_stand_for_are_run_by_themselves():
+    parameters = {"stiffness": [0.7, 0.0, -1.0, np.inf, 1.0], "angle": [0.1, 0.0, 0.1, 0.1, np.nan]}
+    starts = [1.0, 0.5, 0.2, 0.1, 0.0, 0.0]
+    with np.errstate(all="ignore"):
+        found = ricochet.ensemble(Chain, starts, 2.0, parameters=parameters)
+        expected = row_by_row(Chain, starts, 2.0, parameters)
+    assert content(found) == content(expected)
+    assert list(found.failures) == [2] and found.outcome[0] == "reached_end"
+    # A start that no run has, among others.
+    starts = [[1.0, 0.0], [-1.0, 0.0], [2.0, 0.0]]
+    found = ricochet.ensemble(Drop, starts, 1.0, parameters=[0.5, 0.6, 0.7])
+    assert list(found.failures) == [1] and "row 1: ValueError: integrate: " in found.failures[1]
+    assert set(found.event_table["row"]) == {0, 2} and found.complete
+    assert content(found) == content(row_by_row(Drop, starts, 1.0, [0.5, 0.6, 0.7]))
+
+
+class Numbered(Drop):
+    numbers = itertools.count()
+
+    def __init__(self, restitution):
+        super().__init__(restitution * 0.99 ** next(self.numbers))
+
+
+class Counted(Drop):
+    count = 0
+
+    def __init__(self, restitution):
+        Counted.count += 1
+        super().__init__(restitution)
+
+
+class Distinguished(Drop):
+    def __init__(self, restitution):
+        super().__init__(restitution if isinstance(restitution, float) else 0.5)
+
+
+class Caught(Drop):
+    def __init__(self, restitution):
+        try:
+            restitution = float(restitution)
+        except TypeError:
+            restitution = 0.5
+        super().__init__(restitution)
+
+
+class Compared(Drop):
+    def __init__(self, restitution):
+        super().__init__(0.5 if restitution < 0.6 else restitution)
+
+
+class Named(Drop):
+    def __init__(self, restitution):
+        super().__init__(restitution)
+        self.bounciness = float(f"{restitution:.3f}")
+
+
+class Noted(Drop):
+    notes = []
+
+    def __init__(self, restitution):
+        self.notes.append(restitution)
+        super().__init__(restitution)
+
+
+class Distinguishing(Drop):
+    def flow(self, t, x):
+        return [x[1], -9.81 if isinstance(self.bounciness, float) else -5.0]
+
+
+class Random(Drop):
+    def __init__(self, restitution):
+        super().__init__(restitution * np.random.uniform(0.9, 1.0))
+
+
+def closure():
+    count = 0
+
+    def make(restitution):
+        nonlocal count
+        count += 1
+        return Drop(restitution / count)
+    return make
+
+
+@pytest.mark.parametrize("maker, before", [
+    (Numbered, lambda: setattr(Numbered, "numbers", itertools.count())),
+    (Counted, lambda: None), (Distinguished, lambda: None), (Caught, lambda: None),
+    (Compared, lambda: None), (Named, lambda: None), (Noted, Noted.notes.clear),
+    (Distinguishing, lambda: None), (Random, lambda: np.random.seed(4)),
+    (None, lambda: None)])
+def test_systems_that_symbols_cannot_stand_for_are_made_for_each_row(maker, before):
+    given = np.linspace(0.5, 0.9, 9)
+    before()
+    expected = content(row_by_row(maker or closure(), [2.0, 0.0], 2.0, given))
+    before()
+    Counted.count = 0
+    assert content(ricochet.ensemble(maker or closure(), [2.0, 0.0], 2.0, parameters=given)) == expected
+    assert Counted.count == (9 if maker is Counted else 0)
+    assert Noted.notes == (given.tolist() if maker is Noted else [])
+    Noted.notes.clear()
+
+
+def test_whole_numbers_and_texts_as_parameters_are_passed_as_they_are():
+    def make(kind, number):
+        return Drop(0.5 + number % 2 / 5) if kind == "a" else Drop(0.9)
+
+    found = ricochet.ensemble(make, [2.0, 0.0], 2.0, parameters={"kind": ["a", "b"], "number": [3, 4]})
+    assert content(found) == content(row_by_row(Drop, [2.0, 0.0], 2.0, [0.7, 0.9]))
+
+
+def test_symbols_of_parameters_are_no_numbers_of_a_run():
+    class Eager(Drop):
+        def __init__(self, restitution):
+            super().__init__(restitution)
+            self.end = ricochet.integrate(self, [1.0, 0.0], 1.0).x
+
+    tape = ricochet._formula.ParameterTape(1)
+    with pytest.raises(ValueError, match="symbols of the parameters of an ensemble"):
+        Eager(tape.symbols[0])
+    for what in (str, repr, float, "{}".format, abs, bool):
+        with pytest.raises(TypeError, match="formula: found a"):
+            what(tape.symbols[0])
+    given = [0.5, 0.8]
+    found = ricochet.ensemble(Eager, [2.0, 0.0], 2.0, parameters=given)
+    assert content(found) == content(row_by_row(Eager, [2.0, 0.0], 2.0, given))
+
+
+def test_progress_of_formulas_is_shown_and_stops():
+    starts, parameters = np.tile([5.0, 0.0], (200, 1)), np.full(200, 0.8)
+    seen = []
+    whole = ricochet.ensemble(Drop, starts, 1.0, parameters=parameters,
+                              progress=lambda done, rows: seen.append((done, rows)))
+    assert whole.complete and seen[-1] == (200, 200)
+    many = np.tile([5.0, 0.0], (100_000, 1))
+    part = ricochet.ensemble(Drop, many, 20.0, parameters=np.full(100_000, 0.9), threads=1,
+                             progress=lambda done, rows: False)
+    assert not part.complete and 0 < (part.outcome == "reached_end").sum() < 100_000
+    assert set(part.outcome) == {"reached_end", ""}
+    assert len(part.event_table) == part.events.sum()
+
+
+def test_flow_calls_of_differences_are_counted_in_ensembles_of_ready_systems():
+    run = ricochet.integrate(ricochet.StickSlip(), ricochet.StickSlip().start, 1.0, method="rosenbrock4")
+    table = {name: [value] for name, value in ricochet.StickSlip().parameters.items()}
+    found = ricochet.ensemble(ricochet.StickSlip, table, 1.0, method="rosenbrock4")
+    assert found.flow_calls[0] == run.statistics.flow_calls

@@ -35,8 +35,9 @@ class CallbackAdapter final : public RunAdapter {
     using Guards = std::vector<CallbackGuard>;
 
 public:
-    explicit CallbackAdapter(const CallbackSource& source)
-        : source_(source), x_(source.as_list_), dxdt_(source.as_list_)
+    /// @param parameters  of formulas
+    explicit CallbackAdapter(const CallbackSource& source, const double* parameters = nullptr)
+        : source_(source), parameters_(parameters), x_(source.as_list_), dxdt_(source.as_list_)
     {
     }
 
@@ -264,10 +265,9 @@ private:
     {
         const Function& function = source_.flow_;
         if (dxdt.size() != x.size()) dxdt.resize(x.size());
-        if (function.address) {
+        if (function.is_free()) {
             watch().tick();
-            reinterpret_cast<CompiledFlow>(function.address)(mode, t, x.data(), dxdt.data(),
-                                                             x.size(), function.user);
+            function.flow(mode, t, x.data(), dxdt.data(), x.size(), parameters_);
             return true;
         }
         const Ref result = call(function, mode, t, x_.show(x));
@@ -321,9 +321,8 @@ private:
             return values_[which];
         }
         const CallbackGuard& guard = source_.guards_[which];
-        if (guard.value.address) {
-            return by_its_sign(which, reinterpret_cast<CompiledGuard>(guard.value.address)(
-                                          mode, t, x.data(), x.size(), guard.value.user));
+        if (guard.value.is_free()) {
+            return by_its_sign(which, guard.value.value(mode, t, x.data(), x.size(), parameters_));
         }
         return by_its_sign(which, number(guard.value, "", guard.title, mode, t, x));
     }
@@ -398,10 +397,7 @@ private:
                    : member == &CallbackGuard::lower_bound      ? -infinity
                                                                 : infinity;
         }
-        if (function.address) {
-            return reinterpret_cast<CompiledGuard>(function.address)(mode, t, x.data(), x.size(),
-                                                                     function.user);
-        }
+        if (function.is_free()) return function.value(mode, t, x.data(), x.size(), nullptr);
         return at(adapter).number(function, "bound of ", guard.owner, mode, t, x);
     }
 
@@ -413,9 +409,8 @@ private:
                             Mode mode, double t, State& x, bool may_stop = true)
     {
         if (!function) return mode;
-        if (function.address) {
-            const auto reset = reinterpret_cast<CompiledReset>(function.address);
-            const Mode next = reset(mode, t, x.data(), x.size(), function.user);
+        if (function.is_free()) {
+            const Mode next = function.edit(mode, t, x.data(), x.size(), parameters_);
             return source_.moded_ ? next : mode;
         }
         if (!may_stop) {
@@ -574,6 +569,7 @@ private:
     }
 
     const CallbackSource& source_;
+    const double* parameters_;
     Crossing direction_ = Crossing::falling;  ///< of the guard whose reset comes next
     ShownArray x_, dxdt_;
     State there_;
@@ -715,10 +711,14 @@ void CallbackSource::fill_table()
     CallbackAdapter::fill(table_, *this);
 }
 
-void CallbackSource::require_size(const State& x0) const
+void CallbackSource::require_size(const State& x0, const double* parameters) const
 {
-    if (!flow_.is_formula) return;
-    const std::size_t expected = static_cast<const ModedFormula*>(flow_.user)->in(0).components();
+    if (!flow_.formula) return;
+    if (parameter_count_ > 0 && !parameters) {
+        throw std::invalid_argument(
+            "formula: found symbols of the parameters of an ensemble in a run, expected numbers");
+    }
+    const std::size_t expected = flow_.formula->in(0).components();
     if (x0.size() == expected) return;
     throw std::invalid_argument("x0: found " + std::to_string(x0.size()) +
                                 " components for a formula of " + std::to_string(expected));
@@ -732,14 +732,26 @@ std::unique_ptr<RunAdapter> CallbackSource::open(const State& x0) const
 
 std::unique_ptr<RunAdapter> CallbackSource::open_by_series(const State& x0) const
 {
-    if (!series_) return Source::open_by_series(x0);
-    return std::make_unique<FormulaAdapter<detail::TaylorOf<0>>>(open(x0), *series_, x0);
+    return open_for({.by_series = true}, x0);
 }
 
 std::unique_ptr<RunAdapter> CallbackSource::open_implicit(const State& x0) const
 {
-    if (!series_) return implicit_adapter(open(x0), x0);
-    return implicit_formula_adapter(open(x0), *series_, x0);
+    return open_for({.implicit = true}, x0);
+}
+
+std::unique_ptr<RunAdapter> CallbackSource::open_for(const Request& request, const State& x0) const
+{
+    require_size(x0, request.parameters);
+    auto callbacks = std::make_unique<CallbackAdapter>(*this, request.parameters);
+    if (request.by_series) {
+        if (!series_) return Source::open_by_series(x0);
+        return std::make_unique<FormulaAdapter<detail::TaylorOf<0>>>(std::move(callbacks),
+                                                                     series_for(request), x0);
+    }
+    if (!request.implicit) return callbacks;
+    if (!series_) return implicit_adapter(std::move(callbacks), x0);
+    return implicit_formula_adapter(std::move(callbacks), series_for(request), x0);
 }
 
 }  // namespace ricochet::python

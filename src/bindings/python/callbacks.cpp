@@ -61,8 +61,13 @@ Function::Function(PyObject* given, const std::string& who)
         address = PyLong_AsVoidPtr(at.get());
         user = PyLong_AsVoidPtr(with.get());
         if (PyErr_Occurred()) throw PythonError();
-        is_formula = PyObject_HasAttrString(given, "_ricochet_formula") != 0;
         object = Ref::share(given);  // keeps the object that the address belongs to
+        return;
+    }
+    if (PyObject_HasAttrString(given, "_ricochet_formula")) {
+        const Ref of = checked(PyObject_GetAttrString(given, "_ricochet_formula"));
+        formula = pybind11::handle(of.get()).cast<const ModedFormula*>();
+        object = Ref::share(given);
         return;
     }
     if (!PyCallable_Check(given)) {
@@ -85,6 +90,7 @@ CallbackSource::CallbackSource(PyObject* specification)
     }
     free_ = needs_no_interpreter();
     table_.changes_dimension = truth_in(specification, "changes_dimension");
+    parameter_count_ = count_parameters();
     series_ = series_of_formulas();
     small_ = may_be_small();
     fill_table();
@@ -170,7 +176,7 @@ void CallbackSource::read_guards(PyObject* specification)
 
 bool CallbackSource::needs_no_interpreter() const
 {
-    const auto is_free = [](const Function& f) { return !f || f.address; };
+    const auto is_free = [](const Function& f) { return !f || f.is_free(); };
     bool free = is_free(flow_) && is_free(jacobian_) && !guard_values_ && !reset_set_ &&
                 !next_time_event_ && !next_time_event_at_ && !previous_time_event_ &&
                 is_free(time_reset_) && !inclusion_;
@@ -183,16 +189,28 @@ bool CallbackSource::needs_no_interpreter() const
     return free;
 }
 
-std::unique_ptr<FormulaSeries> CallbackSource::series_of_formulas() const
+std::size_t CallbackSource::count_parameters() const
 {
-    const auto formula = [](const Function& of) {
-        return of.is_formula ? static_cast<const ModedFormula*>(of.user) : nullptr;
+    std::size_t count = 0;
+    const auto add = [&](const Function& of) {
+        if (of.formula) count = std::max(count, of.formula->parameters());
     };
+    add(flow_);
+    add(time_reset_);
+    for (const CallbackGuard& guard : guards_) {
+        for (const Function* of : {&guard.value, &guard.reset, &guard.rest}) add(*of);
+    }
+    return count;
+}
+
+std::shared_ptr<const FormulaSeries> CallbackSource::series_of_formulas(
+    const double* parameters) const
+{
     std::vector<const ModedFormula*> guards;
-    for (const CallbackGuard& guard : guards_) guards.push_back(formula(guard.value));
+    for (const CallbackGuard& guard : guards_) guards.push_back(guard.value.formula);
     const bool all = std::ranges::find(guards, nullptr) == guards.end();
-    if (!all || !flow_.is_formula) return nullptr;
-    return std::make_unique<FormulaSeries>(*formula(flow_), std::move(guards));
+    if (!all || !flow_.formula) return nullptr;
+    return std::make_shared<const FormulaSeries>(*flow_.formula, std::move(guards), parameters);
 }
 
 bool CallbackSource::may_be_small() const
@@ -229,7 +247,7 @@ void CallbackSource::read_guard(PyObject* specification)
     guard.upper_bound = function("upper_bound");
     guard.lipschitz = number_in(specification, "lipschitz", 1);
     guard.directed = truth_in(specification, "directed");
-    if (guard.directed && (!guard.reset || guard.reset.address)) {
+    if (guard.directed && (!guard.reset || guard.reset.is_free())) {
         raise(PyExc_ValueError, guard.title + ": found directed, expected a reset in Python");
     }
     if (!guard.value && !guard_values_) {

@@ -10,28 +10,12 @@
 #include <string>
 #include <vector>
 
+#include "formula.hpp"
 #include "formula_series.hpp"
 #include "nonsmooth/sized_inclusion.hpp"
 #include "source.hpp"
 
 namespace ricochet::python {
-
-/// A function of the user's: an object to be called, or the address of a compiled function, which
-/// is called without the interpreter, with `user` as its last argument.
-struct Function {
-    Ref object;
-    void* address = nullptr;
-    void* user = nullptr;
-    bool is_formula = false;  ///< `user` is a `ModedFormula`
-
-    Function() = default;
-    /// Takes a Python object. None stands for no function. An object with `_ricochet_address` is a
-    /// compiled function, one with `_ricochet_formula` a formula.
-    /// @throws PythonError naming `who` if the object is something else
-    Function(PyObject* given, const std::string& who);
-
-    explicit operator bool() const noexcept { return object || address; }
-};
 
 // Signatures of compiled functions. A reset returns the next mode.
 using CompiledFlow = void (*)(std::uint32_t mode, double t, const double* x, double* dxdt,
@@ -42,6 +26,46 @@ using CompiledRate = double (*)(std::uint32_t mode, double t, const double* x, c
                                 std::size_t n, void* user);
 using CompiledReset = std::uint32_t (*)(std::uint32_t mode, double t, double* x, std::size_t n,
                                         void* user);
+
+/// A function of the user's: an object to be called, or one that is called without the interpreter:
+/// a formula, or the address of a compiled function, with `user` as its last argument.
+struct Function {
+    Ref object;
+    void* address = nullptr;
+    void* user = nullptr;
+    const ModedFormula* formula = nullptr;
+
+    Function() = default;
+    /// Takes a Python object. None stands for no function. An object with `_ricochet_address` is a
+    /// compiled function, one with `_ricochet_formula` a formula.
+    /// @throws PythonError naming `who` if the object is something else
+    Function(PyObject* given, const std::string& who);
+
+    explicit operator bool() const noexcept { return bool(object); }
+    [[nodiscard]] bool is_free() const noexcept { return address || formula; }
+
+    // Of functions that are free; formulas are given the parameters.
+
+    void flow(Mode mode, double t, const double* x, double* dxdt, std::size_t n,
+              const double* parameters) const
+    {
+        if (formula) return formula->in(mode).compute(t, x, parameters, dxdt);
+        reinterpret_cast<CompiledFlow>(address)(mode, t, x, dxdt, n, user);
+    }
+    [[nodiscard]] double value(Mode mode, double t, const double* x, std::size_t n,
+                               const double* parameters) const
+    {
+        if (formula) return formula->value(mode, t, x, parameters);
+        return reinterpret_cast<CompiledGuard>(address)(mode, t, x, n, user);
+    }
+    /// Returns the next mode.
+    [[nodiscard]] Mode edit(Mode mode, double t, double* x, std::size_t n,
+                            const double* parameters) const
+    {
+        if (formula) return formula->edit(mode, t, x, parameters);
+        return reinterpret_cast<CompiledReset>(address)(mode, t, x, n, user);
+    }
+};
 
 /// The class `Stop` of Python, an instance of which ends a run; null before it is known.
 [[nodiscard]] Ref& stop_class() noexcept;
@@ -80,7 +104,10 @@ public:
     [[nodiscard]] std::unique_ptr<RunAdapter> open(const State& x0) const override;
     [[nodiscard]] std::unique_ptr<RunAdapter> open_by_series(const State& x0) const override;
     [[nodiscard]] std::unique_ptr<RunAdapter> open_implicit(const State& x0) const override;
+    [[nodiscard]] std::unique_ptr<RunAdapter> open_for(const Request& request,
+                                                       const State& x0) const override;
     [[nodiscard]] bool is_free() const noexcept override { return free_; }
+    [[nodiscard]] std::size_t parameter_count() const noexcept override { return parameter_count_; }
     [[nodiscard]] std::vector<std::string> mode_names() const override;
     [[nodiscard]] std::vector<std::string> guard_names() const override;
     /// By the loop for up to four components, where no function needs the interpreter.
@@ -103,10 +130,17 @@ private:
     /// Whether no function that a run calls needs the interpreter.
     [[nodiscard]] bool needs_no_interpreter() const;
     void fill_table();
+    [[nodiscard]] std::size_t count_parameters() const;
     /// The series of flow and guards; null if one of them is no formula.
-    [[nodiscard]] std::unique_ptr<FormulaSeries> series_of_formulas() const;
-    /// @throws std::invalid_argument for a start that does not fit its formulas
-    void require_size(const State& x0) const;
+    [[nodiscard]] std::shared_ptr<const FormulaSeries> series_of_formulas(
+        const double* parameters = nullptr) const;
+    /// The series of a run, which is that of all runs where there are no parameters.
+    [[nodiscard]] std::shared_ptr<const FormulaSeries> series_for(const Request& request) const
+    {
+        return request.parameters && series_ ? series_of_formulas(request.parameters) : series_;
+    }
+    /// @throws std::invalid_argument for a start, or no parameters, that do not fit its formulas
+    void require_size(const State& x0, const double* parameters = nullptr) const;
     /// Whether the loop for a few components can run it.
     [[nodiscard]] bool may_be_small() const;
 
@@ -125,7 +159,8 @@ private:
     bool as_list_ = false;  ///< states are passed as lists of floats
     bool free_ = false;     ///< whether none of its functions needs the interpreter
     bool small_ = false;    ///< see `may_be_small`
-    std::unique_ptr<FormulaSeries> series_;
+    std::size_t parameter_count_ = 0;
+    std::shared_ptr<const FormulaSeries> series_;
     detail::SystemTable<State> table_;
 };
 

@@ -1,4 +1,5 @@
-// Ensembles of ready systems.
+// Ensembles of systems that need no interpreter: ready ones, and one's own of formulas and compiled
+// functions.
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -6,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -21,6 +21,7 @@
 #include "bindings.hpp"
 #include "read_request.hpp"
 #include "ready.hpp"
+#include "results.hpp"
 #include "ricochet/ensemble.hpp"
 #include "ricochet/run.hpp"
 #include "setup.hpp"
@@ -31,73 +32,144 @@ namespace {
 
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
 
-/// Data that all rows share.
-struct Ensembled {
-    std::string system;
-    std::vector<std::string> names;  ///< names of the parameters, as in models
-    Request request;
-    bool mode_given = false;
-    std::size_t parameters = 0;
-    std::size_t components = 0;
-    const double* parameter_table = nullptr;  ///< row by row
-    const double* start_table = nullptr;      ///< row by row
+/// A table with a row for each run.
+class Table {
+public:
+    explicit Table(const Numbers& numbers)
+        : first_(numbers.data()),
+          rows_(static_cast<std::size_t>(numbers.shape(0))),
+          columns_(static_cast<std::size_t>(numbers.shape(1)))
+    {
+    }
+
+    [[nodiscard]] std::size_t rows() const noexcept { return rows_; }
+    [[nodiscard]] std::size_t columns() const noexcept { return columns_; }
+    [[nodiscard]] std::span<const double> operator[](std::size_t row) const noexcept
+    {
+        return {first_ + row * columns_, columns_};
+    }
+
+private:
+    const double* first_;
+    std::size_t rows_, columns_;
 };
 
 /// A run by the general loop.
 Record run_loop(const Request& request, const Source& source, const State& x0)
 {
-    const std::unique_ptr<RunAdapter> adapter = open_for(request, source, x0);
+    const std::unique_ptr<RunAdapter> adapter = source.open_for(request, x0);
     const OwnedSetup owned = setup_for(request, source, *adapter);
     const auto loop = detail::make_loop(owned.setup, x0, request.options);
-    while (!loop->ended()) loop->advance_once(true);
-    return record_of(loop->finish());
+    loop->run_to_end();
+    return with_counts(record_of(loop->finish()), *adapter);
 }
 
-Record run_row(const Ensembled& all, std::size_t row)
+Record run_row(const Request& request, const Source& source, std::span<const double> start)
 {
-    const std::span<const double> parameters(all.parameter_table + row * all.parameters,
-                                             all.parameters);
-    const double* from = all.start_table + row * all.components;
-    const State x0(from, from + all.components);
-    const std::shared_ptr<Source> source = ready_system(all.system, parameters);
-    for (std::size_t i = 0; i < all.names.size(); ++i) {
-        source->parameters.emplace(all.names[i], parameters[i]);
-    }
-    Request request = all.request;
-    if (!all.mode_given) request.options.mode = source->start_mode();
-    if (request.is_plain()) {
+    const State x0(start.begin(), start.end());
+    if (request.is_plain_or_series()) {
         SignalWatch watch;  // signals are handled by the caller's thread
-        if (std::optional<Record> whole = source->run_whole(x0, request, watch)) {
+        if (std::optional<Record> whole = source.run_whole(x0, request, watch)) {
             return std::move(*whole);
         }
     }
-    return run_loop(request, *source, x0);
+    return run_loop(request, source, x0);
 }
 
-/// Results as columns.
-struct Columns {
-    Columns(std::size_t rows, std::size_t components)
-        : outcome(rows), t(rows, none), x(rows * components, none), mode(rows), counts(5 * rows)
+/// Results as columns, and what was recorded along the way.
+class Columns {
+public:
+    Columns(std::size_t rows, std::size_t components, std::size_t samples)
+        : components_(components),
+          samples_(samples),
+          outcome_(rows),
+          t_(rows, none),
+          x_(rows * components, none),
+          mode_(rows),
+          counts_(5 * rows),
+          events_(rows),
+          states_(rows * samples * components, none)
     {
     }
 
-    void put(std::size_t row, const Record& record, std::size_t components)
+    void put(std::size_t row, Record&& record)
     {
-        outcome[row] = name(record.outcome);
-        t[row] = record.t;
-        std::copy_n(record.x.begin(), std::min(components, record.x.size()),
-                    x.begin() + static_cast<std::ptrdiff_t>(row * components));
-        mode[row] = record.mode;
+        outcome_[row] = name(record.outcome);
+        t_[row] = record.t;
+        const auto put_at = [&](std::vector<double>& out, std::size_t place,
+                                const std::vector<double>& values) {
+            std::ranges::copy(values,
+                              out.begin() + static_cast<std::ptrdiff_t>(place * components_));
+        };
+        put_at(x_, row, record.x);
+        put_at(states_, row * samples_, record.states);
+        mode_[row] = record.mode;
         const Statistics& s = record.statistics;
         const std::uint64_t all[5] = {s.events, s.steps, s.rejected, s.flow_calls, s.guard_calls};
-        std::copy_n(all, 5, counts.begin() + static_cast<std::ptrdiff_t>(5 * row));
+        std::copy_n(all, 5, counts_.begin() + static_cast<std::ptrdiff_t>(5 * row));
+        events_[row] = {record.event_count, std::move(record.events)};
+    }
+
+    [[nodiscard]] py::dict handed_over(const detail::RowsRun& run) const
+    {
+        py::dict failed;
+        std::vector<std::string_view> outcomes = outcome_;
+        for (const RowFailure& failure : run.failures) {
+            failed[py::int_(failure.row)] = failure.message;
+            outcomes[failure.row] = "failed";
+        }
+        // Few different ones, which NumPy turns into texts faster than all of them.
+        py::list names;
+        std::vector<std::string_view> known;
+        std::vector<std::uint8_t> numbers;
+        for (const std::string_view outcome : outcomes) {
+            const auto found = std::ranges::find(known, outcome);
+            numbers.push_back(static_cast<std::uint8_t>(found - known.begin()));
+            if (found != known.end()) continue;
+            known.push_back(outcome);
+            names.append(py::str(outcome));
+        }
+        // A run that was stopped in its last chunk has no outcome.
+        const bool complete = run.complete && std::ranges::find(known, "") == known.end();
+        using namespace py::literals;
+        return py::dict("outcomes"_a = names, "outcome"_a = array_of(numbers), "t"_a = array_of(t_),
+                        "x"_a = array_of(x_), "mode"_a = array_of(mode_),
+                        "counts"_a = array_of(counts_), "failed"_a = failed,
+                        "complete"_a = complete, "events"_a = joined_events(),
+                        "event_counts"_a = event_counts(), "states"_a = array_of(states_));
+    }
+
+private:
+    struct Events {
+        std::size_t count = 0;
+        std::vector<double> values;  ///< as in a `Record`
+    };
+
+    [[nodiscard]] py::array event_counts() const
+    {
+        std::vector<std::int64_t> counts;
+        for (const Events& each : events_) counts.push_back(static_cast<std::int64_t>(each.count));
+        return array_of(counts);
+    }
+    /// The events of all rows, one after the other.
+    [[nodiscard]] py::array joined_events() const
+    {
+        std::size_t count = 0;
+        for (const Events& each : events_) count += each.count;
+        py::array out = new_events(components_, count);
+        auto* to = static_cast<double*>(out.mutable_data());
+        for (const Events& each : events_) to = std::ranges::copy(each.values, to).out;
+        return out;
     }
 
     static constexpr double none = std::numeric_limits<double>::quiet_NaN();
-    std::vector<std::string_view> outcome;  ///< empty if the row was not run
-    std::vector<double> t, x;
-    std::vector<std::uint32_t> mode;
-    std::vector<std::uint64_t> counts;
+    std::size_t components_, samples_;
+    std::vector<std::string_view> outcome_;  ///< empty if the row was not run
+    std::vector<double> t_, x_;
+    std::vector<std::uint32_t> mode_;
+    std::vector<std::uint64_t> counts_;
+    std::vector<Events> events_;
+    std::vector<double> states_;
 };
 
 Background<EnsembleProgress>::Show shower(const py::object& progress)
@@ -108,48 +180,24 @@ Background<EnsembleProgress>::Show shower(const py::object& progress)
     };
 }
 
-py::dict handed_over(const Columns& columns, const detail::RowsRun& run)
+/// Runs the rows of `starts`, in a thread that signals and progress do not wait for.
+/// @param run  (request, row) -> Record, from several threads at a time
+template <class Run>
+py::dict run_all(const Table& starts, Request&& request, unsigned threads,
+                 const py::object& progress, const Run& run)
 {
-    py::dict failures;
-    std::vector<std::string_view> outcomes = columns.outcome;
-    for (const RowFailure& failure : run.failures) {
-        failures[py::int_(failure.row)] = failure.message;
-        outcomes[failure.row] = "failed";
-    }
-    py::list names;
-    for (const std::string_view outcome : outcomes) names.append(py::str(outcome));
-    using namespace py::literals;
-    return py::dict("outcome"_a = names, "t"_a = array_of(columns.t), "x"_a = array_of(columns.x),
-                    "mode"_a = array_of(columns.mode), "counts"_a = array_of(columns.counts),
-                    "failures"_a = failures, "complete"_a = run.complete);
-}
-
-py::dict ensemble(const std::string& system, const std::vector<std::string>& names,
-                  const Numbers& parameters, const Numbers& starts, const py::dict& options,
-                  unsigned threads, const py::object& progress)
-{
-    Ensembled all{.system = system,
-                  .names = names,
-                  .request = request_from(options),
-                  .mode_given = options.contains("mode"),
-                  .parameters = static_cast<std::size_t>(parameters.shape(1)),
-                  .components = static_cast<std::size_t>(starts.shape(1)),
-                  .parameter_table = parameters.data(),
-                  .start_table = starts.data()};
-    const auto rows = static_cast<std::size_t>(starts.shape(0));
-    all.request.options.record_events = false;
-    validate(all.request.options, all.request.fixed);
-    Columns columns(rows, all.components);
+    validate(request.options, request.fixed);
+    Columns columns(starts.rows(), starts.columns(), request.options.sample_times.size());
     Background<EnsembleProgress> background(shower(progress));
-    all.request.options.cancelled = &background.stopped();
-    detail::RowsRun run;
+    request.options.cancelled = &background.stopped();
+    detail::RowsRun rows;
     background.run([&] {
-        run = detail::run_rows(
-            rows,
+        rows = detail::run_rows(
+            starts.rows(),
             [&](const EnsembleRow& row) {
-                const Record record = run_row(all, row.index);
+                Record record = run(request, row.index);
                 if (record.outcome == Outcome::cancelled) return;  // counts as not run
-                columns.put(row.index, record, all.components);
+                columns.put(row.index, std::move(record));
             },
             {.threads = threads,
              .progress = [&](const EnsembleProgress& now) { return background.report(now); },
@@ -159,14 +207,55 @@ py::dict ensemble(const std::string& system, const std::vector<std::string>& nam
         background.raised()->restore();
         throw py::error_already_set();
     }
-    return handed_over(columns, run);
+    return columns.handed_over(rows);
+}
+
+/// @param names  of the parameters, as in models
+py::dict ready_ensemble(const std::string& system, const std::vector<std::string>& names,
+                        const Numbers& parameters, const Numbers& starts, const py::dict& options,
+                        unsigned threads, const py::object& progress)
+{
+    const Table table(starts), values(parameters);
+    Request request = request_from(options);
+    request.options.record_events = false;
+    const bool mode_given = options.contains("mode");
+    return run_all(table, std::move(request), threads, progress,
+                   [&](const Request& all, std::size_t row) {
+                       const std::shared_ptr<Source> source = ready_system(system, values[row]);
+                       for (std::size_t i = 0; i < names.size(); ++i) {
+                           source->parameters.emplace(names[i], values[row][i]);
+                       }
+                       Request own = all;
+                       if (!mode_given) own.options.mode = source->start_mode();
+                       return run_row(own, *source, table[row]);
+                   });
+}
+
+/// @param parameters  of formulas, row by row
+py::dict own_ensemble(const std::shared_ptr<Source>& source, const Numbers& parameters,
+                      const Numbers& starts, const py::dict& options, unsigned threads,
+                      const py::object& progress)
+{
+    const Table table(starts), values(parameters);
+    if (values.columns() < source->parameter_count() || values.rows() != table.rows()) {
+        throw py::value_error("parameters: found a table of another shape, expected " +
+                              std::to_string(source->parameter_count()) + " columns");
+    }
+    return run_all(table, request_from(options), threads, progress,
+                   [&](const Request& all, std::size_t row) {
+                       if (source->parameter_count() == 0) return run_row(all, *source, table[row]);
+                       Request own = all;
+                       own.parameters = values[row].data();
+                       return run_row(own, *source, table[row]);
+                   });
 }
 
 }  // namespace
 
 void bind_ensemble(py::module_& module)
 {
-    module.def("ensemble", &ensemble);
+    module.def("ready_ensemble", &ready_ensemble);
+    module.def("own_ensemble", &own_ensemble);
     module.def("row_seed",
                [](std::uint64_t seed, std::size_t index) { return row_seed(seed, index); });
 }

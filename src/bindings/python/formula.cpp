@@ -13,9 +13,9 @@ namespace ricochet::python {
 
 namespace {
 
-/// Operations of formulas without parameters and networks.
+/// Operations of formulas without networks.
 constexpr auto plain =
-    std::span(formula_names).first<static_cast<std::size_t>(FormulaCode::tanh) + 1>();
+    std::span(formula_names).first<static_cast<std::size_t>(FormulaCode::parameter) + 1>();
 
 }  // namespace
 
@@ -32,8 +32,11 @@ Formula::Formula(std::size_t components,
             throw std::invalid_argument("formula: found no operation '" + name + "'");
         }
         const auto code = static_cast<FormulaCode>(found - plain.begin());
+        const bool is_parameter = code == FormulaCode::parameter;
+        if (is_parameter) parameters_ = std::max(parameters_, a + 1);
         const bool is_leaf = code <= FormulaCode::constant;
         const std::size_t before = code == FormulaCode::component ? components
+                                   : is_parameter                 ? parameters_
                                    : is_leaf                      ? 1
                                                                   : ops_.size();
         if (std::max(a, b) >= before) {
@@ -61,38 +64,39 @@ std::vector<double>& scratch()
 
 }  // namespace
 
-void Formula::compute(double t, const double* x, double* out) const
+void Formula::compute(double t, const double* x, const double* parameters, double* out) const
 {
-    if (const ValuesCode code = code_->get()) return code(t, x, out);
+    if (const ValuesCode code = code_->get()) return code(t, x, parameters, out);
     // As many as a method of six stages asks for in fifty steps; less time than the code takes.
     constexpr std::uint32_t enough = 300;
     code_->count(enough, [&] { return code(); });
-    evaluate(t, x, out, scratch());
+    evaluate(t, x, parameters, out, scratch());
 }
 
-void formula_flow(std::uint32_t mode, double t, const double* x, double* dxdt, std::size_t /*n*/,
-                  void* user)
+std::size_t ModedFormula::parameters() const noexcept
 {
-    const auto& formulas = *static_cast<const ModedFormula*>(user);
-    formulas.in(mode).compute(t, x, dxdt);
+    std::size_t most = 0;
+    for (const Formula& formula : by_mode) most = std::max(most, formula.parameters());
+    return most;
 }
 
-std::uint32_t formula_reset(std::uint32_t mode, double t, double* x, std::size_t n, void* user)
+double ModedFormula::value(std::uint32_t mode, double t, const double* x,
+                           const double* parameters) const
+{
+    double out = 0;
+    in(mode).compute(t, x, parameters, &out);
+    return out;
+}
+
+std::uint32_t ModedFormula::edit(std::uint32_t mode, double t, double* x,
+                                 const double* parameters) const
 {
     thread_local std::vector<double> after;
-    const auto& formulas = *static_cast<const ModedFormula*>(user);
-    after.resize(n);
-    formulas.in(mode).compute(t, x, after.data());
+    const Formula& formula = in(mode);
+    after.resize(formula.components());
+    formula.compute(t, x, parameters, after.data());
     std::copy(after.begin(), after.end(), x);
-    return mode < formulas.following.size() ? formulas.following[mode] : mode;
-}
-
-double formula_guard(std::uint32_t mode, double t, const double* x, std::size_t /*n*/, void* user)
-{
-    const auto& formulas = *static_cast<const ModedFormula*>(user);
-    double value = 0;
-    formulas.in(mode).compute(t, x, &value);
-    return value;
+    return mode < following.size() ? following[mode] : mode;
 }
 
 const detail::LazyTape& FormulaSeries::tape(Mode mode, const std::string& name) const
@@ -111,9 +115,9 @@ detail::LazyTape FormulaSeries::record(Mode mode) const
     std::vector<Recorded> x(n), results(n + guards_.size()), values;
     for (Recorded& component : x) component = {recording, recording.push_back({})};
     const Recorded t(recording, recording.push_back({}));
-    flow_->in(mode).evaluate(t, x, results, values);
+    flow_->in(mode).evaluate(t, x, parameters_, results, values);
     for (std::size_t i = 0; i < guards_.size(); ++i) {
-        guards_[i]->in(mode).evaluate(t, x, &results[n + i], values);
+        guards_[i]->in(mode).evaluate(t, x, parameters_, &results[n + i], values);
     }
     std::vector<int> outputs;
     for (const Recorded& result : results) {

@@ -38,7 +38,7 @@ private:
     MachineCode made_;  ///< written by one thread
 };
 
-/// Functions of the time and the state, for scalars of any type.
+/// Functions of the time, the state and parameters, for scalars of any type.
 class Formula {
 public:
     /// @param ops      for each operation: name, first and second operand, value of a constant
@@ -50,41 +50,46 @@ public:
             std::vector<std::size_t> outputs);
 
     [[nodiscard]] std::size_t components() const noexcept { return components_; }
+    /// Number of parameters that it must be given.
+    [[nodiscard]] std::size_t parameters() const noexcept { return parameters_; }
 
     /// The values for numbers, by code once there have been many.
     /// @param out  may not overlap x
-    void compute(double t, const double* x, double* out) const;
+    void compute(double t, const double* x, const double* parameters, double* out) const;
 
     /// Code for `compute`, or nothing.
     [[nodiscard]] MachineCode code() const noexcept { return code_of_values(ops_, outputs_); }
 
     /// @param values  work space
     template <class S, class Xs, class Outputs>
-    void evaluate(const S& t, const Xs& x, Outputs&& out, std::vector<S>& values) const
+    void evaluate(const S& t, const Xs& x, const double* parameters, Outputs&& out,
+                  std::vector<S>& values) const
     {
         values.clear();
-        for (const FormulaOp& op : ops_) values.push_back(result(op, t, x, values));
+        for (const FormulaOp& op : ops_) values.push_back(result(op, t, x, parameters, values));
         for (std::size_t i = 0; i < outputs_.size(); ++i) out[i] = values[outputs_[i]];
     }
 
 private:
     template <class S, class Xs>
     [[nodiscard]] static S result(const FormulaOp& op, const S& t, const Xs& x,
-                                  const std::vector<S>& values)
+                                  const double* parameters, const std::vector<S>& values)
     {
         if (op.code == FormulaCode::component) return x[op.a];
         if (op.code == FormulaCode::time) return t;
         if (op.code == FormulaCode::constant) return S(op.value);
+        if (op.code == FormulaCode::parameter) return S(parameters[op.a]);
         return apply(op.code, values[op.a], values[op.b]);
     }
 
     std::size_t components_;
+    std::size_t parameters_ = 0;
     std::vector<FormulaOp> ops_;
     std::vector<std::size_t> outputs_;
     std::unique_ptr<LateCode<ValuesCode>> code_;
 };
 
-/// A formula for each mode. Its address is passed to compiled functions as `user`.
+/// A formula for each mode.
 struct ModedFormula {
     std::vector<Formula> by_mode;            ///< one for all where there are no modes
     std::vector<std::uint32_t> following{};  ///< of a reset: the mode after it, for each
@@ -93,13 +98,14 @@ struct ModedFormula {
     {
         return by_mode[mode < by_mode.size() ? mode : 0];
     }
+    /// Number of parameters of all modes.
+    [[nodiscard]] std::size_t parameters() const noexcept;
+    /// As a guard.
+    [[nodiscard]] double value(std::uint32_t mode, double t, const double* x,
+                               const double* parameters) const;
+    /// As a reset: x⁻ becomes x⁺; returns the next mode.
+    [[nodiscard]] std::uint32_t edit(std::uint32_t mode, double t, double* x,
+                                     const double* parameters) const;
 };
-
-/// `CompiledFlow` and `CompiledGuard` that evaluate the formula at `user`.
-void formula_flow(std::uint32_t mode, double t, const double* x, double* dxdt, std::size_t n,
-                  void* user);
-double formula_guard(std::uint32_t mode, double t, const double* x, std::size_t n, void* user);
-/// The same for a `CompiledReset`.
-std::uint32_t formula_reset(std::uint32_t mode, double t, double* x, std::size_t n, void* user);
 
 }  // namespace ricochet::python

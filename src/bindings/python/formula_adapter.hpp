@@ -65,13 +65,13 @@ public:
 
 private:
     template <class S, class Outputs>
-    static void evaluate(const Formula& formula, const S& t, const std::vector<S>& x, Outputs&& out)
+    void evaluate(const Formula& formula, const S& t, const std::vector<S>& x, Outputs&& out) const
     {
         if constexpr (std::is_same_v<S, double>) {
-            formula.compute(t, x.data(), out.data());
+            formula.compute(t, x.data(), series_->parameters(), out.data());
         } else {
             thread_local std::vector<S> values;
-            formula.evaluate(t, x, out, values);
+            formula.evaluate(t, x, series_->parameters(), out, values);
         }
     }
     template <class S>
@@ -93,11 +93,12 @@ class FormulaAdapter final : public RunAdapter {
     using Table = detail::SystemTable<State>;
 
 public:
-    FormulaAdapter(std::unique_ptr<RunAdapter> callbacks, const FormulaSeries& series,
-                   const State& x0)
+    FormulaAdapter(std::unique_ptr<RunAdapter> callbacks,
+                   std::shared_ptr<const FormulaSeries> series, const State& x0)
         : callbacks_(std::move(callbacks)),
+          series_(std::move(series)),
           table_(detail::system_table<FormulaSystem, State>),
-          system_(*callbacks_, series),
+          system_(*callbacks_, *series_),
           adapter_(system_, x0)
     {
         Forwarding<FormulaSystem>::all_but_flow_and_guards(table_, callbacks_->table());
@@ -115,6 +116,7 @@ public:
 
 private:
     std::unique_ptr<RunAdapter> callbacks_;
+    std::shared_ptr<const FormulaSeries> series_;
     Table table_;
     FormulaSystem system_;
     detail::StepperAdapter<FormulaSystem, State, Method> adapter_;

@@ -34,10 +34,10 @@ enum class FormulaCode : std::uint8_t {
     sinh,
     cosh,
     tanh,
-    // In gradients only.
     parameter,  ///< number a
-    network,    ///< number a, whose inputs begin at b in the list of operands
-    output,     ///< number b of the network's evaluation a
+    // In gradients only.
+    network,  ///< number a, whose inputs begin at b in the list of operands
+    output,   ///< number b of the network's evaluation a
 };
 
 /// An operation on results of operations before it.

@@ -18,9 +18,13 @@ namespace ricochet::python {
 /// For each mode: the tape, and code that is made after some steps of any runs.
 class FormulaSeries {
 public:
-    /// Keeps references to the formulas.
-    FormulaSeries(const ModedFormula& flow, std::vector<const ModedFormula*> guards)
-        : flow_(&flow), guards_(std::move(guards)), modes_(flow.by_mode.size())
+    /// Keeps references to the formulas and to the parameters that they are given.
+    FormulaSeries(const ModedFormula& flow, std::vector<const ModedFormula*> guards,
+                  const double* parameters = nullptr)
+        : flow_(&flow),
+          guards_(std::move(guards)),
+          parameters_(parameters),
+          modes_(flow.by_mode.size())
     {
         for (auto& mode : modes_) mode = std::make_unique<InMode>();
     }
@@ -30,6 +34,7 @@ public:
     {
         return guards_;
     }
+    [[nodiscard]] const double* parameters() const noexcept { return parameters_; }
     [[nodiscard]] std::size_t modes() const noexcept { return modes_.size(); }
     /// The code in a mode, or null.
     [[nodiscard]] SeriesCode code(Mode mode) const noexcept { return in(mode).code.get(); }
@@ -64,6 +69,7 @@ private:
 
     const ModedFormula* flow_;
     std::vector<const ModedFormula*> guards_;
+    const double* parameters_;
     std::vector<std::unique_ptr<InMode>> modes_;
 };
 

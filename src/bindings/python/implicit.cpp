@@ -212,9 +212,11 @@ std::unique_ptr<RunAdapter> implicit_adapter(std::unique_ptr<RunAdapter> callbac
 }
 
 std::unique_ptr<RunAdapter> implicit_formula_adapter(std::unique_ptr<RunAdapter> callbacks,
-                                                     const FormulaSeries& series, const State& x0)
+                                                     std::shared_ptr<const FormulaSeries> series,
+                                                     const State& x0)
 {
-    return std::make_unique<FormulaAdapter<Rosenbrock4>>(std::move(callbacks), series, x0);
+    return std::make_unique<FormulaAdapter<Rosenbrock4>>(std::move(callbacks), std::move(series),
+                                                         x0);
 }
 
 }  // namespace ricochet::python

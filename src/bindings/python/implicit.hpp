@@ -15,6 +15,7 @@ namespace ricochet::python {
 /// A adapter for formulas, of which the Jacobian is exact.
 /// @param callbacks  a adapter to the same system, for its resets and further functions
 [[nodiscard]] std::unique_ptr<RunAdapter> implicit_formula_adapter(
-    std::unique_ptr<RunAdapter> callbacks, const FormulaSeries& series, const State& x0);
+    std::unique_ptr<RunAdapter> callbacks, std::shared_ptr<const FormulaSeries> series,
+    const State& x0);
 
 }  // namespace ricochet::python

@@ -209,11 +209,13 @@ public:
 
     void emit(std::span<const std::size_t> outputs)
     {
-        const auto size = static_cast<std::int32_t>((ops_.size() * 8 + 8 + 15) / 16 * 16);
-        if (calls_) {  // registers that functions preserve
-            for (const General saved : {General::rbx, General::r12, General::r13}) push(saved);
+        // Of calls the stack is a multiple of 16.
+        const auto size = static_cast<std::int32_t>((ops_.size() * 8 + 8 + 15) / 16 * 16) + 8;
+        if (calls_) {
+            for (const General each : saved) push(each);
             move(General::r12, General::rdi);
-            move(General::r13, General::rsi);
+            move(General::r13, General::rdx);
+            move(General::r14, General::rsi);
         }
         take_from_stack(size);
         find_constants();
@@ -221,16 +223,19 @@ public:
         for (std::size_t i = 0; i < ops_.size(); ++i) compute(i);
         for (std::size_t i = 0; i < outputs.size(); ++i) {
             const Xmm result = loaded(outputs[i]);
-            store({calls_ ? General::r13 : General::rsi, bytes_of(i)}, result);
+            store({calls_ ? General::r13 : General::rdx, bytes_of(i)}, result);
         }
         add_to_stack(size);
         if (calls_) {
-            for (const General saved : {General::r13, General::r12, General::rbx}) pop(saved);
+            for (std::size_t i = saved.size(); i-- > 0;) pop(saved[i]);
         }
         leave();
     }
 
 private:
+    /// Registers that functions preserve.
+    static constexpr std::array saved{General::rbx, General::r12, General::r13, General::r14};
+
     [[nodiscard]] static bool have_calls(std::span<const FormulaOp> ops) noexcept
     {
         return std::ranges::any_of(ops, [](const FormulaOp& op) {
@@ -250,6 +255,9 @@ private:
         if (op.code == FormulaCode::component) return {x, bytes_of(op.a)};
         if (op.code == FormulaCode::constant) return constant(op.value);
         if (op.code == FormulaCode::time) return time();
+        if (op.code == FormulaCode::parameter) {
+            return {calls_ ? General::r14 : General::rsi, bytes_of(op.a)};
+        }
         return {General::rsp, bytes_of(i)};
     }
     [[nodiscard]] Place time() { return {General::rsp, bytes_of(ops_.size())}; }
@@ -270,7 +278,7 @@ private:
     void compute(std::size_t i)
     {
         const FormulaOp& op = ops_[i];
-        if (op.code <= FormulaCode::constant) return;  // has a place
+        if (op.code <= FormulaCode::constant || op.code == FormulaCode::parameter) return;
         if (const OfTwo function = function_of_two(op.code)) {
             load(xmm1, place(op.b));
             load(xmm0, place(op.a));

@@ -16,8 +16,8 @@
 
 namespace ricochet::python {
 
-/// Values of functions of the time and the state, into `out`, which may not overlap x.
-using ValuesCode = void (*)(double t, const double* x, double* out);
+/// Values of functions of the time, the state and parameters, into `out`, which may not overlap x.
+using ValuesCode = void (*)(double t, const double* x, const double* parameters, double* out);
 /// Coefficients as by `detail::LazyTape::compute`, whose number is returned.
 using SeriesCode = int (*)(double t, const double* x, int order, double* out, double* guards);
 

@@ -3,7 +3,6 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include <bit>
 #include <chrono>
 #include <cstdint>
 #include <exception>
@@ -34,17 +33,18 @@ using Numbers = std::vector<double>;
 
 /// The values of a formula, by the interpreter or by code; nothing where no code is made.
 std::optional<Numbers> values_of(const ricochet::python::ModedFormula& of, double t,
-                                 const Numbers& x, std::size_t count, bool by_code)
+                                 const Numbers& x, std::size_t count, bool by_code,
+                                 const Numbers& parameters)
 {
     Numbers out(count), scratch;
     const ricochet::python::Formula& formula = of.in(0);
     if (!by_code) {
-        formula.evaluate(t, x, out, scratch);
+        formula.evaluate(t, x, parameters.data(), out, scratch);
         return out;
     }
     const ricochet::python::MachineCode code = formula.code();
     if (!code.start()) return std::nullopt;
-    code.as<ricochet::python::ValuesCode>()(t, x.data(), out.data());
+    code.as<ricochet::python::ValuesCode>()(t, x.data(), parameters.data(), out.data());
     return out;
 }
 
@@ -138,6 +138,7 @@ PYBIND11_MODULE(_ricochet, module)
     py::class_<Source, std::shared_ptr<Source>>(module, "Source")
         .def_property_readonly("guard_count",
                                [](const Source& self) { return self.guard_names().size(); })
+        .def_property_readonly("guard_names", &Source::guard_names)
         .def_property_readonly("start_mode", &Source::start_mode)
         .def_property_readonly("is_free", &Source::is_free)
         .def_property(
@@ -201,20 +202,10 @@ PYBIND11_MODULE(_ricochet, module)
              }),
              py::arg("components"), py::arg("modes"),
              py::arg("following") = std::vector<std::uint32_t>())
-        .def_property_readonly(
-            "address", [](ModedFormula& self) { return std::bit_cast<std::uintptr_t>(&self); })
-        .def_property_readonly_static(
-            "flow_address",
-            [](const py::object&) { return std::bit_cast<std::uintptr_t>(&formula_flow); })
-        .def_property_readonly_static(
-            "guard_address",
-            [](const py::object&) { return std::bit_cast<std::uintptr_t>(&formula_guard); })
-        .def("values", &values_of)
+        .def("values", &values_of, py::arg("t"), py::arg("x"), py::arg("count"), py::arg("by_code"),
+             py::arg("parameters") = Numbers())
         .def("series", &series_of)
-        .def("time_to_make_series", &time_to_make_series)
-        .def_property_readonly_static("reset_address", [](const py::object&) {
-            return std::bit_cast<std::uintptr_t>(&formula_reset);
-        });
+        .def("time_to_make_series", &time_to_make_series);
     bind_guard_network(module);
     bind_network(module);
     bind_runs(module);

@@ -249,6 +249,13 @@ py::array events_of(const Record& record, const py::handle& owner)
                    owner);
 }
 
+py::array new_events(std::size_t width, std::size_t count)
+{
+    return {event_type(width),
+            {static_cast<py::ssize_t>(count)},
+            {static_cast<py::ssize_t>(sizeof(EventHead) + 2 * width * sizeof(double))}};
+}
+
 void raise_with(const PythonError& error, PyRun&& run)
 {
     const py::object attached = py::cast(std::move(run));

@@ -41,6 +41,9 @@ struct PySolution {
 /// The events of a record as a structured array, which keeps `owner` alive.
 [[nodiscard]] py::array events_of(const Record& record, const py::handle& owner);
 
+/// A new structured array of events with states of `width` components, which are not set.
+[[nodiscard]] py::array new_events(std::size_t width, std::size_t count);
+
 /// Names of the modes of a system: `given`, else the names that the system has, else None.
 [[nodiscard]] py::object modes_of(const Source& source, const py::object& given);
 

@@ -66,12 +66,6 @@ void detect_without_gate(detail::RunBindings<State>& setup, const Request& reque
 
 }  // namespace
 
-std::unique_ptr<RunAdapter> open_for(const Request& request, const Source& source, const State& x0)
-{
-    if (request.implicit) return source.open_implicit(x0);
-    return request.by_series ? source.open_by_series(x0) : source.open(x0);
-}
-
 RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunAdapter& adapter,
                  const State& x0)
 {

@@ -16,11 +16,6 @@ struct OwnedSetup {
     std::shared_ptr<const void> detector;
 };
 
-/// Opens the adapter of a run.
-/// @throws std::invalid_argument for a start, or a method, that the source cannot serve.
-[[nodiscard]] std::unique_ptr<RunAdapter> open_for(const Request& request, const Source& source,
-                                                   const State& x0);
-
 /// The setup of a run of `source` at `adapter`, which must outlive it.
 /// @throws std::invalid_argument for an unknown detector or locator, or a gate of a kind that the
 /// detector cannot use.

@@ -113,16 +113,6 @@ void work_freely(bool freely, const Work& work)
     return record;
 }
 
-/// Adds what an implicit method has done.
-[[nodiscard]] Record with_counts(Record record, RunAdapter& adapter)
-{
-    const ImplicitCounts& counts = adapter.implicit();
-    record.jacobians = counts.jacobians;
-    record.factorizations = counts.factorizations;
-    record.statistics.flow_calls += counts.flow_calls;
-    return record;
-}
-
 PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& request,
              const py::object& mode_names)
 {
@@ -141,7 +131,7 @@ PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& r
         return out;
     }
 
-    const std::unique_ptr<RunAdapter> adapter = open_for(request, *source, x0);
+    const std::unique_ptr<RunAdapter> adapter = source->open_for(request, x0);
     request.options.cancelled = adapter->watch().cancelled();
     const OwnedSetup owned = setup_for(request, *source, *adapter);
     StepEnds<State> steps;
@@ -253,7 +243,7 @@ public:
         Request request = request_from(given);
         if (!given.contains("mode")) request.options.mode = source_->start_mode();
         record_steps_ = request.record_steps;
-        adapter_ = open_for(request, *source_, x0);
+        adapter_ = source_->open_for(request, x0);
         request.options.cancelled = adapter_->watch().cancelled();
         setup_ = setup_for(request, *source_, *adapter_);
         try {

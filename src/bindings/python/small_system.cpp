@@ -28,10 +28,14 @@ public:
     static constexpr bool unchecked_names = true;
     using State = detail::SmallState;
 
-    SmallSystem(const CallbackSource& source, std::size_t components, SignalWatch& watch)
+    /// @param series  of a run by Taylor's method
+    SmallSystem(const CallbackSource& source, std::size_t components, const double* parameters,
+                const FormulaSeries* series, SignalWatch& watch)
         : name(source.name_.empty() ? "Python" : source.name_),
           source_(&source),
           components_(components),
+          parameters_(parameters),
+          series_(series),
           watch_(&watch)
     {
     }
@@ -39,7 +43,7 @@ public:
     std::string name;
 
     [[nodiscard]] SignalWatch& watch() const noexcept { return *watch_; }
-    [[nodiscard]] const FormulaSeries& series() const noexcept { return *source_->series_; }
+    [[nodiscard]] const FormulaSeries& series() const noexcept { return *series_; }
     [[nodiscard]] std::size_t mode_count() const noexcept { return source_->mode_count_; }
     [[nodiscard]] std::size_t guard_count() const noexcept { return source_->guards_.size(); }
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const { return guard(which).info; }
@@ -48,9 +52,7 @@ public:
     void flow(Mode mode, double t, const Xs& x, Xs& dxdt) const
     {
         watch_->tick();
-        const Function& function = source_->flow_;
-        reinterpret_cast<CompiledFlow>(function.address)(mode, t, x.data(), dxdt.data(),
-                                                         components_, function.user);
+        source_->flow_.flow(mode, t, x.data(), dxdt.data(), components_, parameters_);
     }
     [[nodiscard]] double guard(std::size_t which, Mode mode, double t, const State& x) const
     {
@@ -58,8 +60,7 @@ public:
         // One that is not examined in this mode may have no value there.
         if (!enabled(which, mode)) return 1;
         const CallbackGuard& of = guard(which);
-        const double g = reinterpret_cast<CompiledGuard>(of.value.address)(
-            mode, t, x.data(), components_, of.value.user);
+        const double g = of.value.value(mode, t, x.data(), components_, parameters_);
         return g == 0 && of.info.boolean ? -1 : g;
     }
     [[nodiscard]] bool enabled(std::size_t which, Mode mode) const
@@ -109,8 +110,7 @@ private:
     [[nodiscard]] Mode edit(const Function& function, Mode mode, double t, State& x) const
     {
         if (!function) return mode;
-        const Mode next = reinterpret_cast<CompiledReset>(function.address)(
-            mode, t, x.data(), components_, function.user);
+        const Mode next = function.edit(mode, t, x.data(), components_, parameters_);
         return source_->moded_ ? next : mode;
     }
     void add_times(Table& table) const
@@ -135,6 +135,8 @@ private:
 
     const CallbackSource* source_;
     std::size_t components_;
+    const double* parameters_;
+    const FormulaSeries* series_;
     SignalWatch* watch_;
 };
 
@@ -271,8 +273,10 @@ std::optional<Record> CallbackSource::run_whole(const State& x0, const Request& 
     const std::size_t n = x0.size();
     const bool fits = small_ && n > 0 && n <= SmallState::room && request.is_plain_or_series();
     if (!fits || (request.by_series && !series_)) return std::nullopt;
-    require_size(x0);
-    const SmallSystem system(*this, n, watch);
+    require_size(x0, request.parameters);
+    const std::shared_ptr<const FormulaSeries> series =
+        request.by_series ? series_for(request) : nullptr;
+    const SmallSystem system(*this, n, request.parameters, series.get(), watch);
     SmallRun run(system, x0, request);
     if (!request.by_series) return run.by_name(system, request.method);
     switch (n) {

@@ -112,6 +112,16 @@ private:
     ImplicitCounts implicit_;
 };
 
+/// Adds what an implicit method has done.
+[[nodiscard]] inline Record with_counts(Record record, RunAdapter& adapter)
+{
+    const ImplicitCounts& counts = adapter.implicit();
+    record.jacobians = counts.jacobians;
+    record.factorizations = counts.factorizations;
+    record.statistics.flow_calls += counts.flow_calls;
+    return record;
+}
+
 class Source {
 public:
     Source() = default;
@@ -139,6 +149,14 @@ public:
         throw std::invalid_argument("method: found 'rosenbrock4' for a system without it");
     }
 
+    /// The same for the method of a request, with its parameters.
+    [[nodiscard]] virtual std::unique_ptr<RunAdapter> open_for(const Request& request,
+                                                               const State& x0) const
+    {
+        if (request.implicit) return open_implicit(x0);
+        return request.by_series ? open_by_series(x0) : open(x0);
+    }
+
     /// The whole run by a loop made for this system, if there is one for such a request. Does not
     /// need the interpreter.
     [[nodiscard]] virtual std::optional<Record> run_whole(const State& /*x0*/,
@@ -150,6 +168,8 @@ public:
 
     /// Whether its runs need no interpreter and hold no function of Python.
     [[nodiscard]] virtual bool is_free() const noexcept { return false; }
+    /// Number of parameters that requests for its runs must have.
+    [[nodiscard]] virtual std::size_t parameter_count() const noexcept { return 0; }
     /// Names of the modes, empty where they are numbers.
     [[nodiscard]] virtual std::vector<std::string> mode_names() const = 0;
     [[nodiscard]] virtual std::vector<std::string> guard_names() const = 0;
