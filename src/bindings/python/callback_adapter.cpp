@@ -732,12 +732,16 @@ std::unique_ptr<RunAdapter> CallbackSource::open(const State& x0) const
 
 std::unique_ptr<RunAdapter> CallbackSource::open_by_series(const State& x0) const
 {
-    return open_for({.by_series = true}, x0);
+    Request request;
+    request.by_series = true;
+    return open_for(request, x0);
 }
 
 std::unique_ptr<RunAdapter> CallbackSource::open_implicit(const State& x0) const
 {
-    return open_for({.implicit = true}, x0);
+    Request request;
+    request.implicit = true;
+    return open_for(request, x0);
 }
 
 std::unique_ptr<RunAdapter> CallbackSource::open_for(const Request& request, const State& x0) const
