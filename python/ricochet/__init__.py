@@ -18,6 +18,7 @@ from ._system import Guard, Stop, System, every, guard
 
 # What many programs do not use is imported when it is first asked for.
 _LATER = {
+    "_animation": ("Animation", "animate"),
     "_compiled": ("C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Compiled"),
     "_ensemble": ("Ensemble", "ensemble", "row_seed"),
     "_filippov": ("Filippov",),
@@ -38,11 +39,12 @@ _HOME = {name: module for module, names in _LATER.items() for name in names}
 globals().update(_READY)  # BouncingBall and the other ready systems
 
 __all__ = [
-    "Adjoint", "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified", "Compiled", "Cut",
-    "Ensemble", "Filippov", "Fmu", "FmuRun", "Gradient", "Guard", "GuardNetwork", "Inclusion", "Kind",
-    "Monitor", "Network", "OdeResult", "Perceptron", "Run", "Scene", "SceneKind", "SceneRun", "Simulation",
-    "Snapshot", "Solution", "Stop", "System", "Times", "Trained", "Verdict", "adjoint", "certify",
-    "ensemble", "every", "find_periodic_orbit", "gradient", "guard", "integrate", "load_fmu",
+    "Adjoint", "Animation", "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified",
+    "Compiled", "Cut", "Ensemble", "Filippov", "Fmu", "FmuRun", "Gradient", "Guard", "GuardNetwork",
+    "Inclusion", "Kind", "Monitor", "Network", "OdeResult", "Perceptron", "Run", "Scene",
+    "SceneKind", "SceneRun", "Simulation", "Snapshot", "Solution", "Stop", "System", "Times",
+    "Trained", "Verdict", "adjoint", "animate", "certify", "ensemble", "every",
+    "find_periodic_orbit", "gradient", "guard", "integrate", "load_fmu",
     "monodromy", "plot", "row_seed", "sensitivities", "solve_ivp", "train_classifier", "train_gate",
     *_READY,
 ]

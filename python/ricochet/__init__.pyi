@@ -271,6 +271,13 @@ class SceneRun:
     surface_names: list[str]
     statistics: SimpleNamespace
     def __init__(self, scene: Any, found: dict[str, Any]) -> None: ...
+    def animate(self, speed: float = 1.0) -> Animation: ...
+
+class Animation:
+    svg: str
+    duration: float
+    def __init__(self, svg: str, duration: float) -> None: ...
+    def save(self, path: Union[str, PathLike[str]]) -> None: ...
 
 class Scene:
     def __init__(self, gravity: ArrayLike = (0.0, 0.0), *, period: ArrayLike = (0.0, 0.0),
@@ -528,6 +535,9 @@ def solve_ivp(fun: Union[Callable[..., Any], Compiled, System, Ready],
               progress: Union[None, bool, Callable[[float, float], Any]] = None,
               rtol: ArrayLike = 1e-3, atol: ArrayLike = 1e-6, max_step: float = ...,
               first_step: Optional[float] = None, **options: Any) -> OdeResult: ...
+
+def animate(run: Any, draw: Optional[Callable[[float, _Floats], ArrayLike]] = None, *,
+            speed: float = 1.0, frames: int = 300) -> Animation: ...
 
 def plot(run: Any, components: Optional[Sequence[int]] = None, *,
          labels: Optional[Sequence[str]] = None, phase: Optional[Tuple[int, int]] = None,

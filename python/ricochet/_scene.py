@@ -114,7 +114,18 @@ class SceneRun:
         self.energy_at_end = float(scene.energy(last[0] + last[3] * period, last[1])[0]
                                    + 0.5 * self.spins**2 @ inertias)
         self.body_names, self.surface_names = scene.body_names, scene.surface_names
+        self._radii, self._period = scene.radii, period
+        self._surfaces = scene._scene.surfaces(self.times.tolist())  # as an animation draws them
         self.statistics = SimpleNamespace(**found["statistics"])
+
+    def animate(self, speed=1.0):
+        """The motion between ``sample_times`` as an `Animation`, as by `ricochet.animate`."""
+        from ._animation import animate
+        return animate(self, speed=speed)
+
+    def _repr_html_(self):
+        from ._animation import page_of_scene
+        return page_of_scene(self)
 
     def __repr__(self):
         return (f"<SceneRun: {self.outcome} at t = {self.t!r}, {len(self.body_names)} bodies, "

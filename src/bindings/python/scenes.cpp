@@ -12,6 +12,7 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "arrays.hpp"
@@ -325,6 +326,22 @@ template <class Of>
         "contact_defect"_a = s.contact_defect, "alone"_a = s.alone, "groups"_a = s.groups);
 }
 
+/// The surfaces as they are drawn: whether it is a wall, its points, the normal, the centre and
+/// radius of an arc, and its displacements at some times, none where it is fixed.
+[[nodiscard]] py::list surfaces_of(const PyScene& of, const std::vector<double>& times)
+{
+    py::list out;
+    for (const Scene::Surface& surface : of.scene.surfaces()) {
+        std::vector<Vector2> moved;
+        if (!std::holds_alternative<Fixed>(surface.motion)) {
+            for (const double t : times) moved.push_back(displacement(surface.motion, t));
+        }
+        out.append(py::make_tuple(surface.is_wall, surface.points, surface.normal, surface.centre,
+                                  surface.radius, moved));
+    }
+    return out;
+}
+
 /// Runs a scene while other threads of Python go on.
 [[nodiscard]] SceneRun run_without_lock(const Scene& scene, SceneOptions& options)
 {
@@ -593,6 +610,7 @@ PYBIND11_MODULE(_scenes, module)
              [](const PyScene& self, const py::dict& given) {
                  return explain(self.scene, options_for(self, given));
              })
+        .def("surfaces", &surfaces_of)
         .def("energy", &energies);
     module.def("read_scene", [](const std::string& text, const std::string& file) {
         return from_file(read_scene(text, file));
