@@ -214,29 +214,41 @@ const MaterialPair* Scene::pair_of(std::uint32_t a, std::uint32_t b) const noexc
     return found == pair_numbers_.end() ? nullptr : &pairs_[found->second];
 }
 
+/// Requires a place and a velocity with which a body can start.
+void Scene::require_motion(const Disc& body, std::string_view label, bool of_system) const
+{
+    require_moderate(body.at, fmt::format("{}: position", label));
+    require_moderate(body.velocity, fmt::format("{}: velocity", label));
+    if (of_system) return;
+    for (const Surface& surface : surfaces_) {
+        if (!moves(surface.motion)) require_outside(body, surface);
+    }
+}
+
+void Scene::require_turn(const Disc& body, std::string_view label)
+{
+    require_finite(who, fmt::format("{}: angle", label), body.angle);
+    require_finite(who, fmt::format("{}: spin", label), body.spin);
+    if (body.inertia == 0 && body.spin != 0) {
+        refuse(fmt::format("{}: has a spin of {:g} rad/s and no inertia", label, body.spin));
+    }
+}
+
 BodyId Scene::add(const Disc& body, std::string_view kind)
 {
     const std::string label =
         body.name.empty() ? fmt::format("{} {}", kind, bodies_.size()) : body.name;
     const std::string prefix = label + ": ";
-    require_moderate(body.at, prefix + "position");
-    require_moderate(body.velocity, prefix + "velocity");
     require_positive(who, prefix + "mass", body.mass);
     require_not_negative(who, prefix + "drag", body.drag);
     require_not_negative(who, prefix + "inertia", body.inertia);
-    require_finite(who, prefix + "angle", body.angle);
-    require_finite(who, prefix + "spin", body.spin);
-    if (body.inertia == 0 && body.spin != 0) {
-        refuse(fmt::format("{}has a spin of {:g} rad/s and no inertia", prefix, body.spin));
-    }
+    require_turn(body, label);
     require_material(body.material, label);
     if (static_cast<double>(bodies_.size()) + 1 > std::numeric_limits<std::uint32_t>::max() / 2.0) {
         refuse("there are more bodies than handles");
     }
     require_room(1);
-    for (const Surface& surface : surfaces_) {
-        if (kind == "body" && !moves(surface.motion)) require_outside(body, surface);
-    }
+    require_motion(body, label, kind != "body");
     take_name(body.name, "body");
     bodies_.push_back(body);
     return {static_cast<std::uint32_t>(bodies_.size() - 1)};
@@ -258,6 +270,52 @@ BodyId Scene::point(const Point& point)
                 .drag = point.drag,
                 .material = point.material},
                "body");
+}
+
+void Scene::set_gravity(const Vector2& gravity)
+{
+    require_vector(gravity, "gravity");
+    settings_.gravity = gravity;
+}
+
+/// The name of a body whose start can be changed.
+std::string Scene::require_movable(BodyId body) const
+{
+    if (body.index >= bodies_.size()) {
+        refuse(fmt::format("found the body {}, and there are {}", body.index, bodies_.size()));
+    }
+    if (system_of(body.index)) refuse(name_of(body) + " starts where its system does");
+    return name_of(body);
+}
+
+void Scene::set_turn(BodyId body, double angle, double spin)
+{
+    const std::string label = require_movable(body);
+    Disc turned = bodies_[body.index];
+    turned.angle = angle;
+    turned.spin = spin;
+    require_turn(turned, label);
+    bodies_[body.index] = turned;
+}
+
+void Scene::set_start(BodyId body, const Vector2& at, const Vector2& velocity)
+{
+    const std::string label = require_movable(body);
+    Disc moved = bodies_[body.index];
+    moved.at = at;
+    moved.velocity = velocity;
+    require_motion(moved, label, false);
+    bodies_[body.index] = moved;
+}
+
+void Scene::set_coefficients(MaterialId material, double restitution, double friction)
+{
+    require_material(material, "the coefficients");
+    Material& of = materials_[material.index];
+    check_coefficients(restitution, friction, of.by_speed,
+                       fmt::format("material \"{}\": ", of.name));
+    of.restitution = restitution;
+    of.friction = friction;
 }
 
 SurfaceId Scene::wall(const Wall& wall)

@@ -27,6 +27,7 @@ constexpr std::uint64_t least_acts = 2048;
 SceneLoop::SceneLoop(World& world, double t_end)
     : world_(world),
       t_end_{t_end, 0},
+      pause_{t_end, 0},
       calendar_(world.bodies.size() + world.islands->count() +
                 (world.options.contacts ? world.bodies.size() : 0)),
       slots_(world.bodies.size(), none),
@@ -159,6 +160,45 @@ void SceneLoop::watch_work()
     if (std::fabs(grid_.side() / before - 1) < 0.1) work_.interval *= 2;
 }
 
+/// Predicts the first acts of all members.
+void SceneLoop::predict_all()
+{
+    for (const std::uint32_t island : islands_) step_island(island);
+    for (const std::uint32_t i : members_) predict(i);
+    fail_where_broken();
+}
+
+/// Lets the first act of the calendar, at t, happen.
+void SceneLoop::act(const Instant& t)
+{
+    if (before(now_, t)) {
+        now_ = t;
+        idle_ = 0;
+    } else if (++idle_ > most_idle + 64 * members_.size()) {
+        return fail(Outcome::endless_cascade, {}, "the time does not advance any more");
+    }
+    const auto bodies = static_cast<std::uint32_t>(world_.bodies.size());
+    const std::uint32_t who = calendar_.first();
+    if (who >= bodies) {
+        const auto groups = entry_of_group(0);
+        who < groups ? step_island(who - bodies) : step_group(who - groups);
+    } else if (leaves_first(who)) {
+        leave_square(who);
+    } else if (before(pending_[who].crossing, pending_[who].t)) {
+        cross(who);
+    } else {
+        happen(who);
+    }
+    if (world_.broken) fail_where_broken();
+    show_events();
+    if (result_.event_count >= world_.options.max_events) {
+        fail(Outcome::step_limit, {},
+             fmt::format("max_events = {} events have happened", world_.options.max_events));
+    }
+    if (is_cancelled()) fail(Outcome::cancelled, {}, "the run was cancelled");
+    if (celled_ && --work_.left == 0 && !result_.failure) watch_work();
+}
+
 GroupResult SceneLoop::run(std::span<const std::uint32_t> bodies_of_group,
                            std::vector<SceneEvent> events, Samples& samples)
 {
@@ -168,11 +208,8 @@ GroupResult SceneLoop::run(std::span<const std::uint32_t> bodies_of_group,
     if (bounces && flies_past_end(members_.front())) return std::move(result_);
     place_all();
     if (!bounces) settle_at_start();
-    for (const std::uint32_t island : islands_) step_island(island);
-    for (const std::uint32_t i : members_) predict(i);
-    fail_where_broken();
+    predict_all();
     const auto bodies = static_cast<std::uint32_t>(world_.bodies.size());
-    const SceneOptions& options = world_.options;
     const auto fetch = [&](std::uint32_t who) {
         if (who >= bodies) return;
         fetch_record(world_.bodies[who]);
@@ -183,37 +220,34 @@ GroupResult SceneLoop::run(std::span<const std::uint32_t> bodies_of_group,
     while (!result_.failure && !calendar_.empty(fetch)) {
         const Instant t = calendar_.first_time();
         if (before(t_end_, t)) break;
-        if (next_sample_ < options.sample_times.size()) sample_until(t, false, samples);
-        if (before(now_, t)) {
-            now_ = t;
-            idle_ = 0;
-        } else if (++idle_ > most_idle + 64 * members_.size()) {
-            fail(Outcome::endless_cascade, {}, "the time does not advance any more");
-            break;
-        }
-        const std::uint32_t who = calendar_.first();
-        if (who >= bodies) {
-            const auto groups = entry_of_group(0);
-            who < groups ? step_island(who - bodies) : step_group(who - groups);
-        } else if (leaves_first(who)) {
-            leave_square(who);
-        } else if (before(pending_[who].crossing, pending_[who].t)) {
-            cross(who);
-        } else {
-            happen(who);
-        }
-        if (world_.broken) fail_where_broken();
-        show_events();
-        if (result_.event_count >= options.max_events) {
-            fail(Outcome::step_limit, {},
-                 fmt::format("max_events = {} events have happened", options.max_events));
-        }
-        if (is_cancelled()) fail(Outcome::cancelled, {}, "the run was cancelled");
-        if (celled_ && --work_.left == 0 && !result_.failure) watch_work();
+        if (next_sample_ < world_.options.sample_times.size()) sample_until(t, false, samples);
+        act(t);
     }
     const Instant end = result_.failure ? result_.failure->t : t_end_;
     sample_until(end, true, samples);
     return std::move(result_);
+}
+
+void SceneLoop::start(std::span<const std::uint32_t> bodies)
+{
+    begin(bodies, {});
+    driven_ = true;
+    pause_ = now_;
+    place_all();
+    settle_at_start();
+    predict_all();
+}
+
+void SceneLoop::advance(const Instant& to)
+{
+    result_.events.clear();
+    shown_ = 0;
+    pause_ = to;
+    while (!result_.failure && result_.events.empty() && !calendar_.empty()) {
+        const Instant t = calendar_.first_time();
+        if (before(to, t)) break;
+        act(t);
+    }
 }
 
 void SceneLoop::show_new_events()
@@ -263,12 +297,12 @@ void SceneLoop::fail_island(std::uint32_t island)
          fmt::format("the step of the island of {} fell below what the time resolves", first));
 }
 
-/// Whether nothing but a body's steps happens up to t: no sample, no end of the run, no cancelling.
+/// Whether nothing but a body's steps happens up to t: no sample, no pause, no cancelling.
 bool SceneLoop::nothing_before(const Instant& t) const
 {
     const auto& times = world_.options.sample_times;
     if (next_sample_ < times.size() && !before(t, {times[next_sample_], 0})) return false;
-    return !is_cancelled() && before(t, t_end_);
+    return !is_cancelled() && before(t, pause_);
 }
 
 void SceneLoop::step_island(std::uint32_t island)
@@ -277,7 +311,8 @@ void SceneLoop::step_island(std::uint32_t island)
     const Instant& end = islands.end(island);
     for (;;) {
         if (!islands.advance(island)) return fail_island(island);
-        if (islands.stalls(island)) {
+        // Driven from outside a run has no length to which a step is too short.
+        if (!driven_ && islands.stalls(island)) {
             return fail(Outcome::stalled, islands.members(island),
                         fmt::format("the steps of the island of {} are shorter than 1e-8 of the "
                                     "run: its drag or a spring is too stiff for the method",

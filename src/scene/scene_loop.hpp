@@ -72,6 +72,17 @@ public:
     GroupResult run(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events,
                     Samples& samples);
 
+    // Instead of `run`, driven from outside.
+
+    /// Places these bodies, to be advanced by `advance`. Events at the start are in `result()`.
+    void start(std::span<const std::uint32_t> bodies);
+    /// Advances to the next event, or to a time up to the end where none happens until then.
+    void advance(const Instant& to);
+    /// The events of the last `advance`, the number of all, and the reason of an end.
+    [[nodiscard]] const GroupResult& result() const noexcept { return result_; }
+    /// Time of the last act.
+    [[nodiscard]] const Instant& now() const noexcept { return now_; }
+
 private:
     void begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events);
     struct Pending {
@@ -104,7 +115,9 @@ private:
         Exit exit{};
     };
 
+    void act(const Instant& t);
     void place_all();
+    void predict_all();
     void fill_cells();
     [[nodiscard]] Vector2 place_now(std::uint32_t i) const;
     void lay_cells_again();
@@ -268,6 +281,9 @@ private:
     World& world_;
     std::vector<std::uint32_t> members_;
     Instant t_end_;
+    /// What happens later is left to a later `advance`.
+    Instant pause_;
+    bool driven_ = false;  ///< by `advance`, an event at a time
     Grid grid_;
     bool celled_ = false;          ///< whether bodies can meet each other
     bool on_terrain_ = false;      ///< whether there is terrain that does not move

@@ -130,7 +130,7 @@ bool SceneLoop::flies_past_end(std::uint32_t i) const
 void SceneLoop::bounce(std::uint32_t i)
 {
     Body& body = world_.bodies[i];
-    if (!flies_above_one_wall(body)) return;
+    if (driven_ || !flies_above_one_wall(body)) return;
     const Face& wall = world_.faces[0];
     const Vector2 along = turned(wall.normal);
     const double pull = dot(world_.gravity, wall.normal);

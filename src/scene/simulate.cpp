@@ -90,6 +90,19 @@ std::optional<Failure> run_groups(World& world, double t_end, SceneRun& run)
 
 namespace {
 
+/// States of everything at t, and the counts until then.
+void show_states(const World& world, const Instant& t, SceneRun& run)
+{
+    run.t = t.value;
+    reserve_large(run.bodies, world.bodies.size());
+    for (std::uint32_t i = 0; i < world.bodies.size(); ++i) run.bodies.push_back(world.state(i, t));
+    for (std::uint32_t i = 0; i < world.turns.size(); ++i) run.turns.push_back(world.turn(i, t));
+    for (std::uint32_t k = 0; k < world.islands->count(); ++k) {
+        if (world.islands->is_system(k)) run.systems.push_back(world.islands->state(k, t));
+    }
+    run.statistics = world.statistics;
+}
+
 /// One pass over all groups; a failure of one group ends the others at that time, in another
 /// pass.
 SceneRun run_until(const Scene& scene, const SceneOptions& options, const SceneTuning& tuning,
@@ -108,16 +121,7 @@ SceneRun run_until(const Scene& scene, const SceneOptions& options, const SceneT
     }
     if (failure) *first = *failure;
     const Instant end = failure ? failure->t : Instant{t_end, 0};
-    run.t = end.value;
-    reserve_large(run.bodies, world.bodies.size());
-    for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
-        run.bodies.push_back(world.state(i, end));
-    }
-    for (std::uint32_t i = 0; i < world.turns.size(); ++i) run.turns.push_back(world.turn(i, end));
-    for (std::uint32_t k = 0; k < world.islands->count(); ++k) {
-        if (world.islands->is_system(k)) run.systems.push_back(world.islands->state(k, end));
-    }
-    run.statistics = world.statistics;
+    show_states(world, end, run);
     return run;
 }
 
@@ -200,6 +204,101 @@ void require_resolved(const Scene& scene, const SceneOptions& options)
 }
 
 }  // namespace
+
+// --- driven from outside ---
+
+struct SceneSimulation::Parts {
+    Parts(const Scene& of, const SceneOptions& with)
+        : scene(of), options(with), world(scene, options), loop(world, options.t_end)
+    {
+        std::vector<std::uint32_t> all(world.bodies.size());
+        std::iota(all.begin(), all.end(), 0U);
+        world.statistics.groups = 1;
+        if (!all.empty()) loop.start(all);
+        t = loop.now();
+        hold_failure();
+    }
+
+    /// A run that cannot go on is at the time of that.
+    void hold_failure()
+    {
+        if (loop.result().failure) t = loop.result().failure->t;
+    }
+
+    Scene scene;
+    SceneOptions options;
+    World world;
+    SceneLoop loop;
+    Instant t;
+};
+
+namespace {
+
+SceneOptions require_drivable(const Scene& scene, const SceneOptions& options)
+{
+    validate(options);
+    require(options.sample_times.empty(), "SceneSimulation", "sample_times", "be empty",
+            static_cast<double>(options.sample_times.size()));
+    scene.check(options.t_start);
+    require_resolved(scene, options);
+    scene.require_room(0);
+    SceneOptions out = options;
+    out.record_events = true;
+    return out;
+}
+
+}  // namespace
+
+SceneSimulation::SceneSimulation(const Scene& scene, const SceneOptions& options)
+    : parts_(std::make_unique<Parts>(scene, require_drivable(scene, options)))
+{
+}
+SceneSimulation::~SceneSimulation() = default;
+SceneSimulation::SceneSimulation(SceneSimulation&&) noexcept = default;
+SceneSimulation& SceneSimulation::operator=(SceneSimulation&&) noexcept = default;
+
+bool SceneSimulation::advance(double to)
+{
+    Parts& parts = *parts_;
+    if (parts.loop.result().failure) return false;
+    const Instant wanted{std::min(to, parts.options.t_end), 0};
+    const Instant until = before(wanted, parts.t) ? parts.t : wanted;
+    if (!parts.world.bodies.empty()) parts.loop.advance(until);
+    const bool event = !events().empty();
+    parts.t = event ? parts.loop.now() : until;
+    parts.hold_failure();
+    return event;
+}
+
+double SceneSimulation::t() const noexcept
+{
+    return parts_->t.value;
+}
+
+bool SceneSimulation::ended() const noexcept
+{
+    // Where there was an event at the end, another one may follow at that time.
+    return parts_->loop.result().failure ||
+           (parts_->t.value >= parts_->options.t_end && events().empty());
+}
+
+std::span<const SceneEvent> SceneSimulation::events() const noexcept
+{
+    return parts_->loop.result().events;
+}
+
+SceneRun SceneSimulation::run() const
+{
+    SceneRun run;
+    show_states(parts_->world, parts_->t, run);
+    run.statistics.events = parts_->loop.result().event_count;
+    if (const auto& failure = parts_->loop.result().failure) {
+        run.outcome = failure->outcome;
+        run.message = failure->message;
+        run.involved = failure->bodies;
+    }
+    return run;
+}
 
 SceneRun simulate(const Scene& scene, const SceneOptions& options)
 {

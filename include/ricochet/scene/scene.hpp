@@ -240,6 +240,17 @@ public:
     void spring(const Spring& spring);
     SystemId system(const SystemBody& system);
 
+    // Changes of what has been added, with the checks and errors of the functions above.
+
+    /// Changes the gravity [m/s^2] of all bodies.
+    void set_gravity(const Vector2& gravity);
+    /// Moves a body that is no disc of a system to another start.
+    void set_start(BodyId body, const Vector2& at, const Vector2& velocity);
+    /// Turns a disc at the start; a spin [rad/s] needs an inertia.
+    void set_turn(BodyId body, double angle, double spin);
+    /// Changes restitution and friction of a material.
+    void set_coefficients(MaterialId material, double restitution, double friction);
+
     /// @throws std::invalid_argument if `bodies` more bodies would exceed the memory limit.
     void require_room(double bodies) const;
 
@@ -296,6 +307,9 @@ public:
 
 private:
     BodyId add(const Disc& body, std::string_view kind);
+    void require_motion(const Disc& body, std::string_view label, bool of_system) const;
+    static void require_turn(const Disc& body, std::string_view label);
+    [[nodiscard]] std::string require_movable(BodyId body) const;
     void take_name(const std::string& name, std::string_view kind);
     void require_material(MaterialId material, std::string_view who) const;
     /// Centres of all bodies at t [s]: those of systems move with the time, too.

@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <memory>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -162,6 +164,45 @@ struct SceneRun {
 /// Simulates the scene from `t_start` to `t_end`.
 /// @throws std::invalid_argument for an invalid scene or option.
 [[nodiscard]] SceneRun simulate(const Scene& scene, const SceneOptions& options);
+
+/// A run of a scene that the caller advances, as a game or a master of co-simulation does:
+///
+///     SceneSimulation game(scene, {.t_end = 3600});
+///     while (running) {
+///         const double frame = game.t() + 1.0 / 60;
+///         while (game.advance(frame)) play(game.events());
+///         draw(game.run().bodies);
+///     }
+///
+/// The end may be far away, since nothing is computed far ahead. All bodies are one group. The
+/// times to which the run is advanced do not affect the motion. It is that of `simulate` with the
+/// same end, which lasting contact and springs step to; to the rounding of the times where
+/// `simulate` takes the bounces of a body alone on a wall in closed form. No run counts as stalled.
+class SceneSimulation {
+public:
+    /// Copies the scene and places its bodies at `t_start`.
+    /// @throws std::invalid_argument as `simulate`, and for options with sample times.
+    SceneSimulation(const Scene& scene, const SceneOptions& options);
+    ~SceneSimulation();
+    SceneSimulation(SceneSimulation&&) noexcept;
+    SceneSimulation& operator=(SceneSimulation&&) noexcept;
+
+    /// Advances to the next event, or to the time `to` [s] where none happens up to then; events
+    /// at that time have then happened. Returns whether there was an event. A time before `t()`
+    /// counts as `t()`, one after the end as the end.
+    bool advance(double to);
+
+    [[nodiscard]] double t() const noexcept;    ///< [s] time reached
+    [[nodiscard]] bool ended() const noexcept;  ///< at `t_end`, or where the run cannot go on
+    /// Events of the last `advance`, all at one time; valid until the next.
+    [[nodiscard]] std::span<const SceneEvent> events() const noexcept;
+    /// States and counts at `t()`, as `simulate` returns them at its end, without the events.
+    [[nodiscard]] SceneRun run() const;
+
+private:
+    struct Parts;
+    std::unique_ptr<Parts> parts_;
+};
 
 /// Describes, in text, how the scene would be run: islands and their motion, which bodies can meet
 /// and when they first do, which tests are skipped and why, and memory. Simulates nothing.
