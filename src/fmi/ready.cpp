@@ -6,13 +6,14 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
-#include <iterator>
+#include <cctype>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
 
+#include "base/read_file.hpp"
 #include "fmi/unpacked.hpp"
 #include "ricochet/systems/ready.hpp"
 
@@ -22,10 +23,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* library_name = "ricochet_ready_fmu.so";
+constexpr std::string_view text_in_fmu = "model.json";
 
-/// Beside the program, as in a build, or where it is installed.
-[[nodiscard]] fs::path ready_library()
+/// A library for FMUs beside the program, as in a build, or where it is installed.
+[[nodiscard]] fs::path library_for_fmus(std::string_view library_name)
 {
     std::error_code error;
     const fs::path here = fs::read_symlink("/proc/self/exe", error).parent_path();
@@ -35,8 +36,8 @@ constexpr const char* library_name = "ricochet_ready_fmu.so";
     for (const fs::path& place : places) {
         if (fs::is_regular_file(place, error)) return place;
     }
-    throw Error(fmt::format("the library of the ready systems is missing; expected '{}'",
-                            places.back().string()));
+    throw Error(
+        fmt::format("a library for FMUs is missing; expected '{}'", places.back().string()));
 }
 
 [[nodiscard]] std::string structured(std::string_view name)
@@ -98,20 +99,18 @@ constexpr const char* library_name = "ricochet_ready_fmu.so";
 }
 
 [[nodiscard]] std::string description_by(const fs::path& library, const std::string& told,
-                                         int version)
+                                         const std::string& resource, int version)
 {
     const std::unique_ptr<void, int (*)(void*)> handle(
         dlopen(library.c_str(), RTLD_NOW | RTLD_LOCAL),
         [](void* of) { return of ? dlclose(of) : 0; });
     if (!handle) throw Error(fmt::format("{}: {}", library.string(), dlerror()));
-    using Describe = const char* (*)(const char* told, int version);
+    using Describe = const char* (*)(const char* told, const char* resource, int version);
     const auto describe =
         reinterpret_cast<Describe>(dlsym(handle.get(), "ricochet_fmu_description_of"));
-    std::string text = describe ? describe(told.c_str(), version) : "";
-    if (text.empty()) {
-        throw Error(fmt::format("{}: does not know '{}'; is it of another version?",
-                                library.string(), told));
-    }
+    std::string text = describe ? describe(told.c_str(), resource.c_str(), version)
+                                : library.string() + ": is of another version";
+    if (!text.starts_with('<')) throw Error(text);
     return text;
 }
 
@@ -149,23 +148,62 @@ void pack(const fs::path& to, std::span<const PackedFile> files)
     if (error) fail();
 }
 
+void require_version(int version)
+{
+    if (version == 2 || version == 3) return;
+    throw Error(fmt::format("found the version {} of FMI; expected 2 or 3", version));
+}
+
+/// Packs a library that has several models, with a description by it.
+void pack_model(const fs::path& library, std::string_view identifier, std::string description,
+                const std::string* resource, int version, const fs::path& file)
+{
+    std::vector<PackedFile> files{{"modelDescription.xml", std::move(description)}};
+    if (resource) files.push_back({"resources/model.json", *resource});
+    const auto refuse = [&](std::string_view why) {
+        throw Error(fmt::format("{}: {}", library.string(), why));
+    };
+    files.push_back({fmt::format("binaries/{}/{}.so", platform_folder(version), identifier),
+                     ricochet::detail::read_file(library, refuse)});
+    pack(file, files);
+}
+
 }  // namespace
 
 void export_ready(const ReadyFmu& wanted, const fs::path& file)
 {
-    if (wanted.version != 2 && wanted.version != 3) {
-        throw Error(fmt::format("found the version {} of FMI; expected 2 or 3", wanted.version));
-    }
+    require_version(wanted.version);
     const std::string of = told(wanted);
-    const fs::path library = ready_library();
-    const std::string description = description_by(library, of, wanted.version);
-    std::ifstream in(library, std::ios::binary);
-    std::string bytes{std::istreambuf_iterator<char>(in), {}};
-    if (!in) throw Error(fmt::format("{}: cannot be read", library.string()));
-    const std::string name = fmt::format("binaries/{}/{}.so", platform_folder(wanted.version),
-                                         structured(wanted.system));
-    pack(file, std::array<PackedFile, 2>{
-                   {{"modelDescription.xml", description}, {name, std::move(bytes)}}});
+    const fs::path library = library_for_fmus("ricochet_ready_fmu.so");
+    pack_model(library, structured(wanted.system), description_by(library, of, "", wanted.version),
+               nullptr, wanted.version, file);
+}
+
+void export_scene(const SceneFmu& wanted, const fs::path& file)
+{
+    require_version(wanted.version);
+    const std::string name = wanted.scene.string();
+    const std::string text = ricochet::detail::read_file(
+        wanted.scene, [&](std::string_view why) { throw Error(fmt::format("{}: {}", name, why)); });
+    std::string identifier = wanted.scene.stem().string();
+    std::ranges::replace_if(
+        identifier, [](unsigned char c) { return !std::isalnum(c) && c != '_'; }, '_');
+    if (identifier.empty() || std::isdigit(static_cast<unsigned char>(identifier[0]))) {
+        identifier.insert(0, "scene_");
+    }
+    std::string told = identifier;
+    for (const auto& [given, value] : wanted.set) told += fmt::format(" {}={}", given, value);
+    const fs::path library = library_for_fmus("ricochet_scene_fmu.so");
+    std::string description;
+    try {
+        description = description_by(library, told, text, wanted.version);
+    } catch (const Error& error) {
+        // The library knows the text by the name that it has in the FMU.
+        std::string_view why = error.what();
+        if (why.starts_with(text_in_fmu)) why.remove_prefix(text_in_fmu.size());
+        throw Error(fmt::format("{}{}{}", name, why.starts_with(':') ? "" : ": ", why));
+    }
+    pack_model(library, identifier, std::move(description), &text, wanted.version, file);
 }
 
 }  // namespace ricochet::fmi

@@ -104,6 +104,39 @@ TEST_F(FmuApp, AReadySystemIsExportedAndRuns)
     }
 }
 
+#ifdef RICOCHET_SCENES
+TEST_F(FmuApp, ASceneIsExportedAndRuns)
+{
+    const std::string scene = std::string(RICOCHET_SCENES) + "/cradle.json";
+    const Result made = run({"fmu", "export", scene, "--set", "gravity.y=-1", "-o", "cradle.fmu"});
+    ASSERT_EQ(made.status, 0) << made.err;
+    const auto there = json({"simulate", "cradle.fmu", "--step", "0.1", "--json"});
+    EXPECT_EQ(there.at("outcome"), "reached_end");
+    const auto here = json({"simulate", scene, "--json"});
+    // Smooth bodies on a floor: gravity changes no impact. In the FMU those of one instant are one.
+    double last = -1;
+    std::size_t instants = 0;
+    for (const auto& event : here.at("events")) {
+        instants += event.at("t").get<double>() > last;
+        last = event.at("t").get<double>();
+    }
+    EXPECT_EQ(there.at("events").size(), instants);
+    fmi_test::write(work() / "bad.json", "{\"bodies\": [{\"disc\": {}}]}");
+    for (const Words& words : {Words{"fmu", "export", "bad.json", "-o", "x.fmu"},
+                               {"fmu", "export", "missing.json", "-o", "x.fmu"},
+                               {"fmu", "export", scene, "--set", "first.z=1", "-o", "x.fmu"},
+                               {"fmu", "export", scene}}) {
+        const Result result = run(words);
+        EXPECT_EQ(result.status, 2) << result.err;
+        EXPECT_FALSE(std::filesystem::exists(work() / "x.fmu"));
+    }
+    EXPECT_NE(run({"fmu", "export", "bad.json", "-o", "x.fmu"}).err.find("bad.json:1"),
+              std::string::npos);
+    // A scene is not overwritten by its FMU.
+    EXPECT_EQ(run({"fmu", "export", "bad.json", "-o", "bad.json"}).status, 2);
+}
+#endif
+
 TEST_F(FmuApp, WhatDoesNotFitIsBadInput)
 {
     fmi_test::write(work() / "m.fmu", "no zip");

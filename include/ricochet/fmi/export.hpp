@@ -400,7 +400,7 @@ private:
 /// come from `ricochet_add_fmu`.
 #define RICOCHET_FMU(Model)                                                                     \
     std::unique_ptr<ricochet::fmi::detail::ExportedModel>                                       \
-    ricochet::fmi::detail::make_exported_model(std::string_view)                                \
+    ricochet::fmi::detail::make_exported_model(const ModelSource&)                              \
     {                                                                                           \
         return std::make_unique<ExportedOf<Model>>(ExportedOf<Model>::facts_of(                 \
             RICOCHET_FMU_IDENTIFIER, RICOCHET_FMU_MODEL_EXCHANGE, RICOCHET_FMU_CO_SIMULATION)); \

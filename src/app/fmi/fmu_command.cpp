@@ -183,15 +183,23 @@ int check_fmu(const FmuRequest& request, const fmi::Fmu& fmu)
 int export_fmu(const FmuRequest& request)
 {
     if (!request.out) throw BadInput("fmu export: found no --out; expected a file");
-    fmi::ReadyFmu wanted{.system = request.words[1], .version = static_cast<int>(request.version)};
+    const std::string& what = request.words[1];
+    const int version = static_cast<int>(request.version);
+    std::vector<std::pair<std::string, double>> set;
     for (const std::string& text : request.set) {
         const Assignment one = assignment("--set", text);
-        wanted.set.emplace_back(one.name, one.value);
+        set.emplace_back(one.name, one.value);
     }
     Claims claims;
+    const bool is_scene = what.ends_with(".json");
+    if (is_scene) claims.reads("the scene", what);
     claims.writes("--out", *request.out);
     try {
-        export_ready(wanted, *request.out);
+        if (is_scene) {
+            fmi::export_scene({.scene = what, .set = set, .version = version}, *request.out);
+        } else {
+            fmi::export_ready({.system = what, .set = set, .version = version}, *request.out);
+        }
     } catch (const fmi::Error& error) {
         throw BadInput(error.what());
     }

@@ -63,7 +63,8 @@ void add_describe_fmu(CLI::App& app, int& status)
     command
         .add_option("MODEL", request->words,
                     "a file that ends in .fmu; before it `check`, to look for faults of its "
-                    "library; or `export` and the name of a ready system")
+                    "library; or `export` and the name of a ready system or a scene "
+                    "file")
         ->required()
         ->expected(1, 2)
         ->type_name("");
@@ -76,7 +77,8 @@ void add_describe_fmu(CLI::App& app, int& status)
         ->type_name("2|3");
     command.footer(
         "Examples:\n  ricochet fmu ball.fmu\n  ricochet fmu check ball.fmu\n"
-        "  ricochet fmu export bouncing-ball --set restitution=0.8 -o ball.fmu");
+        "  ricochet fmu export bouncing-ball --set restitution=0.8 -o ball.fmu\n"
+        "  ricochet fmu export bin.json -o bin.fmu");
     command.callback([&status, request] { status = describe_fmu(*request); });
 }
 

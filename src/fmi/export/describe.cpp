@@ -26,7 +26,7 @@ int main(int count, char** arguments)
     const auto describe = reinterpret_cast<Describe>(dlsym(library, "ricochet_fmu_description"));
     if (describe == nullptr) return fail(arguments[1], "has no RICOCHET_FMU");
     const char* const text = describe(std::atoi(arguments[2]));
-    if (*text == '\0') return fail(arguments[1], "its model cannot be made with its start values");
+    if (*text != '<') return fail(arguments[1], text);
     std::FILE* const file = std::fopen(arguments[3], "w");
     if (file == nullptr) return fail(arguments[3], "cannot be written");
     const bool written = std::fputs(text, file) >= 0;

@@ -29,14 +29,6 @@ std::string escaped(std::string_view text)
     return out;
 }
 
-/// 64 bits of FNV-1a.
-std::uint64_t hash(std::string_view text, std::uint64_t start)
-{
-    std::uint64_t value = start;
-    for (const char c : text) value = (value ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
-    return value;
-}
-
 class Writer {
 public:
     Writer(const ModelFacts& facts, int version, std::string_view token)
@@ -63,9 +55,9 @@ public:
         write_interfaces();
         write_units();
         text_ += fmt::format(
-            "<DefaultExperiment startTime=\"0\" stopTime=\"{}\"/>\n"
+            "<DefaultExperiment startTime=\"{}\" stopTime=\"{}\"/>\n"
             "<ModelVariables>\n",
-            facts_.t_end);
+            facts_.t_start, facts_.t_end);
         write_variables();
         text_ += "</ModelVariables>\n<ModelStructure>\n";
         two_ ? write_structure2() : write_structure3();
@@ -162,7 +154,7 @@ private:
                       .variability = "continuous",
                       .initial = "exact",
                       .reinit = true});
-        for (std::size_t i = 0; i < facts_.states.size(); ++i) {
+        for (std::size_t i = 0; i < count_of(facts_, Quantity::rate); ++i) {
             const std::string name = fmt::format("der({})", facts_.states[i].name);
             add(Quantity::rate, i,
                 {.name = name,
@@ -171,9 +163,11 @@ private:
                  .initial = "calculated",
                  .state = i});
         }
-        add_exported(
-            Quantity::parameter, facts_.parameters,
-            {.name = {}, .causality = "parameter", .variability = "tunable", .initial = "exact"});
+        add_exported(Quantity::parameter, facts_.parameters,
+                     {.name = {},
+                      .causality = "parameter",
+                      .variability = facts_.tunable ? "tunable" : "fixed",
+                      .initial = "exact"});
         add_exported(Quantity::input, facts_.inputs,
                      {.name = {}, .causality = "input", .variability = "continuous"});
         add_exported(Quantity::output, facts_.outputs,
@@ -227,14 +221,15 @@ private:
             outputs += unknown;
             if (calculated) unknowns += unknown;
         });
-        for (std::size_t i = 0; i < facts_.states.size(); ++i) {
+        for (std::size_t i = 0; i < count_of(facts_, Quantity::rate); ++i) {
             derivatives += fmt::format("<Unknown index=\"{}\"/>\n",
                                        reference_of(facts_, Quantity::rate, i) + 1);
         }
-        text_ += fmt::format(
-            "<Outputs>\n{}</Outputs>\n<Derivatives>\n{}</Derivatives>\n<InitialUnknowns>\n{}{}"
-            "</InitialUnknowns>\n",
-            outputs, derivatives, derivatives, unknowns);
+        text_ += fmt::format("<Outputs>\n{}</Outputs>\n", outputs);
+        if (!derivatives.empty()) {
+            text_ += fmt::format("<Derivatives>\n{}</Derivatives>\n", derivatives);
+        }
+        text_ += fmt::format("<InitialUnknowns>\n{}{}</InitialUnknowns>\n", derivatives, unknowns);
     }
 
     void write_structure3()
@@ -246,7 +241,7 @@ private:
                 initial += fmt::format("<InitialUnknown valueReference=\"{}\"/>\n", reference);
             }
         });
-        for (std::size_t i = 0; i < facts_.states.size(); ++i) {
+        for (std::size_t i = 0; i < count_of(facts_, Quantity::rate); ++i) {
             const std::uint32_t reference = reference_of(facts_, Quantity::rate, i);
             text_ += fmt::format("<ContinuousStateDerivative valueReference=\"{}\"/>\n", reference);
             derivatives += fmt::format("<InitialUnknown valueReference=\"{}\"/>\n", reference);
@@ -266,13 +261,20 @@ private:
 
 }  // namespace
 
+std::uint64_t hash(std::string_view text, std::uint64_t start) noexcept
+{
+    std::uint64_t value = start;
+    for (const char c : text) value = (value ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+    return value;
+}
+
 std::size_t count_of(const ModelFacts& facts, Quantity quantity)
 {
     switch (quantity) {
         case Quantity::time:
         case Quantity::events: return 1;
-        case Quantity::state:
-        case Quantity::rate: return facts.states.size();
+        case Quantity::state: return facts.states.size();
+        case Quantity::rate: return facts.rates ? facts.states.size() : 0;
         case Quantity::parameter: return facts.parameters.size();
         case Quantity::input: return facts.inputs.size();
         case Quantity::output: return facts.outputs.size();
@@ -307,7 +309,7 @@ std::uint32_t reference_of(const ModelFacts& facts, Quantity wanted, std::size_t
 std::string token(const ModelFacts& facts, int version)
 {
     const std::string text = Writer(facts, version, "").write();
-    const std::uint64_t high = hash(text, 0xcbf29ce484222325U);
+    const std::uint64_t high = hash(text);
     const std::uint64_t low = hash(text, high);
     return fmt::format("{{{:08x}-{:04x}-{:04x}-{:04x}-{:012x}}}{}{}", high >> 32,
                        high >> 16 & 0xffff, high & 0xffff, low >> 48, low & 0xffffffffffff,

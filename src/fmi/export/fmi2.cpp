@@ -17,12 +17,13 @@ RICOCHET_FMI_EXPORT int fmi2SetDebugLogging(void*, int, std::size_t, const char*
 {
     return status_ok;
 }
-RICOCHET_FMI_EXPORT void* fmi2Instantiate(const char* name, int type, const char* guid, const char*,
-                                          const Callbacks2* callbacks, int, int)
+RICOCHET_FMI_EXPORT void* fmi2Instantiate(const char* name, int type, const char* guid,
+                                          const char* resources, const Callbacks2* callbacks, int,
+                                          int)
 {
     void* const environment = callbacks != nullptr ? callbacks->environment : nullptr;
     const Exporting::Log2 log = callbacks != nullptr ? callbacks->logger : nullptr;
-    return make_instance(2, type == 0, false, name, guid, environment, log, nullptr);
+    return make_instance(2, type == 0, false, name, guid, resources, environment, log, nullptr);
 }
 RICOCHET_FMI_EXPORT void fmi2FreeInstance(void* c)
 {

@@ -16,17 +16,19 @@ RICOCHET_FMI_EXPORT int fmi3SetDebugLogging(void*, bool, std::size_t, const char
     return status_ok;
 }
 RICOCHET_FMI_EXPORT void* fmi3InstantiateModelExchange(const char* name, const char* token,
-                                                       const char*, bool, bool, void* environment,
-                                                       Log3 log)
+                                                       const char* resources, bool, bool,
+                                                       void* environment, Log3 log)
 {
-    return make_instance(3, true, false, name, token, environment, nullptr, log);
+    return make_instance(3, true, false, name, token, resources, environment, nullptr, log);
 }
 RICOCHET_FMI_EXPORT void* fmi3InstantiateCoSimulation(const char* name, const char* token,
-                                                      const char*, bool, bool, bool event_mode,
-                                                      bool early, const Reference*, std::size_t,
-                                                      void* environment, Log3 log, Update3)
+                                                      const char* resources, bool, bool,
+                                                      bool event_mode, bool early, const Reference*,
+                                                      std::size_t, void* environment, Log3 log,
+                                                      Update3)
 {
-    return make_instance(3, false, event_mode && early, name, token, environment, nullptr, log);
+    return make_instance(3, false, event_mode && early, name, token, resources, environment,
+                         nullptr, log);
 }
 RICOCHET_FMI_EXPORT void* fmi3InstantiateScheduledExecution(const char*, const char*, const char*,
                                                             bool, bool, void*, Log3, void (*)(),

@@ -4,9 +4,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
+#include <iterator>
 #include <new>
 #include <stdexcept>
 #include <string_view>
@@ -56,10 +59,42 @@ Saved parse(std::string_view text)
     return saved;
 }
 
+/// The path of a folder that a URI names, "file:///a%20b".
+std::string path_of(std::string_view uri)
+{
+    for (const std::string_view start : {"file://localhost/", "file:///", "file:/"}) {
+        if (!uri.starts_with(start)) continue;
+        uri.remove_prefix(start.size() - 1);
+        break;
+    }
+    std::string path;
+    while (!uri.empty()) {
+        unsigned char code = 0;
+        const char* const digits = uri.data() + 1;
+        const bool coded = uri.size() >= 3 && uri[0] == '%' &&
+                           std::from_chars(digits, digits + 2, code, 16).ptr == digits + 2;
+        path += coded ? static_cast<char>(code) : uri[0];
+        uri.remove_prefix(coded ? 3 : 1);
+    }
+    return path;
+}
+
+/// Content of the file that tells the model, in the folder of the resources; empty without one.
+std::string read_resource(const char* folder, bool by_uri)
+{
+    if (folder == nullptr) return {};
+    const std::string path = by_uri ? path_of(folder) : std::string(folder);
+    std::ifstream file(path + "/model.json", std::ios::binary);
+    return {std::istreambuf_iterator<char>(file), {}};
+}
+
 }  // namespace
 
-Instance::Instance(bool me, bool events, std::string_view told)
-    : model_exchange(me), event_mode(events), model(make_exported_model(told))
+Instance::Instance(bool me, bool events, const ModelSource& source)
+    : model_exchange(me),
+      event_mode(events),
+      resource(source.resource),
+      model(make_exported_model(source))
 {
 }
 
@@ -79,15 +114,19 @@ double Instance::get(Reference reference)
 {
     const ModelFacts& facts = model->facts();
     const Place place = place_of(facts, reference);
-    std::vector<double> all(count_of(facts, place.quantity));
+    const auto one_of = [&](void (ExportedModel::*compute)(std::span<double>)) {
+        std::vector<double> all(count_of(facts, place.quantity));
+        (*model.*compute)(all);
+        return all[place.index];
+    };
     switch (place.quantity) {
         case Quantity::time: return model->t;
         case Quantity::state: return model->x[place.index];
         case Quantity::parameter: return model->parameters[place.index];
         case Quantity::input: return model->inputs[place.index];
-        case Quantity::rate: model->rates(all); return all[place.index];
-        case Quantity::output: model->outputs(all); return all[place.index];
-        case Quantity::indicator: model->indicators(all); return all[place.index];
+        case Quantity::rate: return one_of(&ExportedModel::rates);
+        case Quantity::output: return one_of(&ExportedModel::outputs);
+        case Quantity::indicator: return one_of(&ExportedModel::indicators);
         case Quantity::events: return static_cast<double>(model->events);
         case Quantity::mode: return model->mode;
         case Quantity::none: break;
@@ -105,7 +144,10 @@ void Instance::set(Reference reference, double value)
             model->x[place.index] = value;
             return;
         case Quantity::parameter:
-            if (!before && stage != Stage::event && stage != Stage::step) break;
+            if (!before &&
+                !(model->facts().tunable && (stage == Stage::event || stage == Stage::step))) {
+                break;
+            }
             model->parameters[place.index] = value;
             model->changed = true;
             return;
@@ -162,12 +204,14 @@ int unit_nominals(double* nominals, std::size_t count)
 }
 
 Instance* make_instance(int version, bool model_exchange, bool event_mode, const char* name,
-                        const char* given_token, void* environment, Instance::Log2 log2,
-                        Log3 log3) noexcept
+                        const char* given_token, const char* resources, void* environment,
+                        Instance::Log2 log2, Log3 log3) noexcept
 {
     try {
         const std::string_view given(given_token != nullptr ? given_token : "");
-        auto made = std::make_unique<Instance>(model_exchange, event_mode, told_by(given));
+        const std::string resource = read_resource(resources, version == 2);
+        auto made = std::make_unique<Instance>(
+            model_exchange, event_mode, ModelSource{.told = told_by(given), .resource = resource});
         made->environment = environment;
         made->log2 = log2;
         made->log3 = log3;
@@ -221,7 +265,8 @@ int reset_instance(void* handle)
 {
     Instance& instance = instance_of(handle);
     return instance.attempt([&] {
-        instance.model = make_exported_model(instance.model->facts().told);
+        instance.model = make_exported_model(
+            {.told = instance.model->facts().told, .resource = instance.resource});
         instance.stage = Stage::instantiated;
         instance.event_waits = false;
     });

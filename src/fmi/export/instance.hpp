@@ -23,8 +23,7 @@ enum class Stage : std::uint8_t {
 
 class Instance {
 public:
-    /// @param told  see `ModelFacts`
-    Instance(bool model_exchange, bool event_mode, std::string_view told);
+    Instance(bool model_exchange, bool event_mode, const ModelSource& source);
 
     using Log2 = void (*)(void*, const char*, int, const char*, const char*, ...);
 
@@ -38,6 +37,7 @@ public:
     Stage stage = Stage::instantiated;
     bool event_waits = false;
     double last_time = 0;  ///< [s] reached by the last step
+    const std::string resource;
     std::unique_ptr<ExportedModel> model;
 
     [[nodiscard]] double get(Reference reference);
@@ -83,9 +83,11 @@ private:
 }
 
 /// A new instance, or null if the token is another model's or the interface is not offered.
+/// @param resources  folder of the resources: a path, or in 2.0 a URI
 [[nodiscard]] Instance* make_instance(int version, bool model_exchange, bool event_mode,
-                                      const char* name, const char* given_token, void* environment,
-                                      Instance::Log2 log2, Log3 log3) noexcept;
+                                      const char* name, const char* given_token,
+                                      const char* resources, void* environment, Instance::Log2 log2,
+                                      Log3 log3) noexcept;
 
 // Functions of both versions.
 int unit_nominals(double* nominals, std::size_t count);

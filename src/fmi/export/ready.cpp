@@ -2,11 +2,9 @@
 // and with which parameters and start.
 #include <fmt/format.h>
 
-#include <charconv>
-#include <cmath>
+#include <algorithm>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <vector>
 
 #include "ricochet/fmi/export.hpp"
@@ -63,21 +61,6 @@ struct Ready {
     }
 };
 
-/// Takes "name=value" for one of the variables.
-[[nodiscard]] bool take(std::string_view word, std::vector<Exported>& variables)
-{
-    const std::size_t equals = word.find('=');
-    for (Exported& variable : variables) {
-        if (word.substr(0, equals) != variable.name) continue;
-        const std::string_view text = word.substr(equals + 1);
-        const auto [end, error] =
-            std::from_chars(text.data(), text.data() + text.size(), variable.start);
-        return error == std::errc() && end == text.data() + text.size() &&
-               std::isfinite(variable.start);
-    }
-    return false;
-}
-
 template <class System>
 [[nodiscard]] std::unique_ptr<ExportedModel> made(std::string_view told)
 {
@@ -86,17 +69,8 @@ template <class System>
     std::ranges::replace(identifier, '-', '_');
     ModelFacts facts = Of::facts_of(identifier.c_str(), true, true);
     facts.told = told;
-    for (told.remove_prefix(System::name.size()); !told.empty();) {
-        told.remove_prefix(1);  // a space
-        const std::string_view word = told.substr(0, told.find(' '));
-        if (!take(word, facts.parameters) && !take(word, facts.states)) {
-            throw std::invalid_argument(
-                fmt::format("{}: found '{}'; expected name=value of a "
-                            "parameter or component",
-                            System::name, word));
-        }
-        told.remove_prefix(word.size());
-    }
+    told.remove_prefix(std::min(told.size(), System::name.size() + 1));
+    facts.take_starts(told);
     std::vector<double> parameters;
     for (const Exported& parameter : facts.parameters) parameters.push_back(parameter.start);
     (void)with_parameters<System>(parameters);  // refuses what is out of range
@@ -105,8 +79,9 @@ template <class System>
 
 }  // namespace
 
-std::unique_ptr<ExportedModel> make_exported_model(std::string_view told)
+std::unique_ptr<ExportedModel> make_exported_model(const ModelSource& source)
 {
+    const std::string_view told = source.told;
     std::unique_ptr<ExportedModel> model;
     ReadySystems::for_each([&]<class System>() {
         if (told.substr(0, told.find(' ')) == System::name) model = made<System>(told);

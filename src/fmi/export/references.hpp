@@ -37,6 +37,9 @@ struct Place {
 [[nodiscard]] std::string description(const ModelFacts& facts, int version);
 /// Hash of the description without it, as a GUID in braces.
 [[nodiscard]] std::string token(const ModelFacts& facts, int version);
+/// 64 bits of FNV-1a.
+[[nodiscard]] std::uint64_t hash(std::string_view text,
+                                 std::uint64_t start = 0xcbf29ce484222325U) noexcept;
 /// What a token tells of the model.
 [[nodiscard]] std::string_view told_by(std::string_view token) noexcept;
 

@@ -5,12 +5,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <limits>
 #include <memory>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "ricochet/fmi/variable.hpp"
@@ -24,11 +26,29 @@ struct ModelFacts {
     std::vector<Exported> states, parameters, inputs, outputs;
     std::vector<std::string> guards;
     bool modes = false;           ///< has an output `mode`
+    bool rates = true;            ///< of the states are variables, too
+    bool tunable = true;          ///< parameters may change during a run
     bool model_exchange = false;  ///< is offered
     bool co_simulation = false;
-    double t_end = 1;  ///< [s] of the default experiment
+    double t_start = 0, t_end = 1;  ///< [s] of the default experiment
     /// What the library is told of the model by the end of the token, where it has several.
     std::string told{};
+    /// What the names of variables point to where they are not known when the library is compiled.
+    std::shared_ptr<std::deque<std::string>> names = std::make_shared<std::deque<std::string>>();
+
+    [[nodiscard]] const char* keep(std::string name)
+    {
+        return names->emplace_back(std::move(name)).c_str();
+    }
+    /// Takes start values, "name=value" with spaces between them, of parameters and states.
+    /// @throws std::invalid_argument for other words
+    void take_starts(std::string_view words);
+};
+
+/// By what a library with several models knows the one that is wanted.
+struct ModelSource {
+    std::string_view told{};      ///< see `ModelFacts`
+    std::string_view resource{};  ///< content of `resources/model.json`, if there is one
 };
 
 /// What a round of event iteration ended with.
@@ -88,8 +108,7 @@ private:
     ModelFacts facts_;
 };
 
-/// Defined by RICOCHET_FMU. @param told  see `ModelFacts`
-/// @throws std::invalid_argument if the library has no such model
-[[nodiscard]] std::unique_ptr<ExportedModel> make_exported_model(std::string_view told);
+/// Defined by RICOCHET_FMU. @throws std::invalid_argument if the library has no such model
+[[nodiscard]] std::unique_ptr<ExportedModel> make_exported_model(const ModelSource& source);
 
 }  // namespace ricochet::fmi::detail
