@@ -50,6 +50,9 @@ template <class Pair>
         opened = opened || now.gap > 4 * now.closed;
         const bool closed = now.gap <= now.closed;
         const double ahead = closed ? pair.linger(now) : pair.safe(now);
+        // Until it may be closed again, a gap that opens at this rate has opened by a quarter of
+        // their product at least.
+        opened = opened || (closed && now.rate * ahead > 16 * now.closed);
         if ((closed || !(s + ahead > s)) && now.rate < -now.noise) return {s, opened};
         const double jump = pair.next_jump(s);
         const double next = std::max(std::min(s + ahead, jump), std::nextafter(s, never));

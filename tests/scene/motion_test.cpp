@@ -126,6 +126,25 @@ TEST(SceneMotion, APistonAddsTwiceItsVelocity)
     EXPECT_EQ(run.events[0].before[1], (Vector2{1, 0}));
 }
 
+TEST(SceneMotion, ABallBouncesOnATableOfConstantVelocityAgainAndAgain)
+{
+    // Along itself, the table may as well be at rest: flights of 2 sqrt(2 h / g), h = 1 m. Falling
+    // or rising at w it changes nothing but the frame: the ball meets it at the speed sqrt(w^2 + 2
+    // g) each time, and its flights last 2 / g of that.
+    for (const Vector2& w : {Vector2{}, Vector2{1, 0}, Vector2{0, -0.5}, Vector2{0, 2}}) {
+        const SceneRun run = simulate(ball_above(ConstantVelocity{.velocity = w}), {.t_end = 10});
+        ASSERT_EQ(run.outcome, Outcome::reached_end) << run.message;
+        const double speed = std::sqrt(w[1] * w[1] + 2 * g);
+        const double first = (speed - w[1]) / g;
+        ASSERT_EQ(run.events.size(), static_cast<std::size_t>((10 - first) * g / speed / 2) + 1);
+        for (std::size_t k = 0; k < run.events.size(); ++k) {
+            const double expected = first + 2 * speed / g * static_cast<double>(k);
+            EXPECT_NEAR(run.events[k].t, expected, 1e-13 * (1 + expected));
+            EXPECT_NEAR(run.events[k].approach(), speed, 1e-12);
+        }
+    }
+}
+
 TEST(SceneMotion, APistonIsElasticForBodiesAtRestThatTouch)
 {
     // Before the impact their energy is zero; after it, it is the work of the piston, to rounding.
