@@ -154,4 +154,14 @@ struct TwoContacts {
     static Motion set_valued() { return {}; }
 };
 
+/// The same on two belts, which stand still. What two belts hold is not determined by the motion
+/// in branches, but by implicit steps.
+struct TwoContactsOnBelts : TwoContacts {
+    struct Motion : TwoContacts::Motion {
+        static void offset(double, Reaction& s) { s.setZero(); }
+        static void offset_rate(double, Reaction& rate) { rate.setZero(); }
+    };
+    static Motion set_valued() { return {}; }
+};
+
 }  // namespace ricochet

@@ -193,6 +193,10 @@ public:
     {
         end(Outcome::non_finite, i);
         const bool has_guard = i < guards_.size();
+        if (phases_ && phases_->name_of && is_of_phases(i)) {
+            run_.reason = phases_->name_of(phases_->adapter, i);
+            return;
+        }
         run_.reason = reason_not_finite(
             function, i, has_guard ? std::string_view(guards_[i].info.name) : std::string_view());
     }

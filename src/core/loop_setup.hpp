@@ -68,7 +68,8 @@ inline void Loop<X, single>::refuse_bad_place() const
     require(first_step_ > 0 && std::isfinite(first_step_), "the first step");
     require(std::isfinite(flight_start_) && longest_step_ >= 0 && std::isfinite(longest_step_),
             "the last event");
-    require(has_ended() || lies_before(place_.t.value, time_event()) || !timed_,
+    // It may be due: an event within the rounding of its time comes before it.
+    require(has_ended() || !lies_before(time_event(), place_.t.value) || !timed_,
             "the next time event");
     const std::size_t modes = engine_.modes();
     require(modes == 0 || place_.mode < modes, "the mode");

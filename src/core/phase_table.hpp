@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -113,6 +114,8 @@ struct PhaseTable {
     PhaseVerdict (*review)(SystemAdapter, const PhaseStep<X>&, X& x) = nullptr;
     /// The phase where the run would end. May move x onto a surface.
     PhaseVerdict (*give_up)(SystemAdapter, const PhaseEnd<X>&, X& x) = nullptr;
+    /// What a guard of the phases is about. May be null.
+    std::string (*name_of)(SystemAdapter, std::size_t guard) = nullptr;
     /// A sentence about the end that the phases have given to the run, or an empty one.
     std::string_view (*reason)(SystemAdapter) = nullptr;
     /// Moves the list of phases to `phases`, where it goes on. This function and the two below may

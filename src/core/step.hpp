@@ -633,8 +633,9 @@ public:
     /// Whether the flow at the start is that of the double after it.
     [[nodiscard]] bool is_beyond() const noexcept
     {
-        const double first = state_.backward ? state_.flow_to : state_.flow_from;
-        return first != (state_.backward ? system_.latest() : system_.earliest());
+        // A bound that an earlier start has left behind says nothing of this one.
+        const double t = state_.start.value;
+        return state_.backward ? state_.flow_to < t : state_.flow_from > t;
     }
 
     /// Keeps the flow at the start of the step that is about to be taken: a method with a series

@@ -90,7 +90,8 @@ void ContactPhases<C>::begin_contact(double t, PhaseCause cause)
 template <class C>
 Mode ContactPhases<C>::decide(const PhaseSet<C>& set, const C& after)
 {
-    if (!setup_.kinds.is_flight(set.before)) return set.after;
+    if (driven_in_ < 0) driven_in_ = setup_.steps->driven_in(set.t, set.x.data(), after.data());
+    if (!setup_.kinds.is_flight(set.before) || driven_in_ >= 0) return set.after;
     for (const std::size_t i : set.fired) memory_.events += i < setup_.event_guards;
     memory_.events += set.on_time;
     if (may_fly(after)) return in_flight(set.after, after);
@@ -124,6 +125,11 @@ template <class C>
 PhaseVerdict ContactPhases<C>::review(const PhaseStep<C>& step)
 {
     if (step.has_advanced) was_in_contact_ = std::exchange(took_, false);
+    if (driven_in_ >= 0) {
+        reason_ = fmt::format("a reset drives contact {} into its obstacle at t = {}",
+                              std::exchange(driven_in_, -1), step.t);
+        return {.kind = PhaseVerdict::Kind::ends, .outcome = Outcome::outside_mode};
+    }
     if (setup_.kinds.is_flight(step.mode)) {
         if (!may_fly(step.x)) return touch_down(step.mode, step.t, PhaseCause::held);
         if (chatters(step.t)) return touch_down(step.mode, step.t, PhaseCause::chattering);

@@ -101,6 +101,7 @@ private:
     std::uint64_t steps_in_contact_ = 0;
     bool took_ = false;  ///< a step in contact, which the rules have not seen yet
     bool was_in_contact_ = false;
+    int driven_in_ = -1;  ///< contact behind which the last set has put a body, or -1
     std::string reason_;
 };
 

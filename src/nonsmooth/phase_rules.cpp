@@ -101,6 +101,14 @@ GuardInfo PhaseRules::guard_info(std::size_t which) const
     return info;
 }
 
+std::string PhaseRules::name_of(std::size_t which) const
+{
+    const std::size_t kind = kind_of_guard(which);
+    const bool of_y = kind < 2 || watches_own(which);
+    return fmt::format("{} of reaction {}", of_y ? "y" : "the value or a bound",
+                       reaction_of(which));
+}
+
 bool PhaseRules::watches(std::size_t which, Kind kind) const
 {
     return has_inclusion() && kind == own && now_->watched[reaction_of(which)];
@@ -293,7 +301,8 @@ Kind PhaseRules::kind_for(Mode b, double t, const double* x, PhaseCause cause)
     if (b == several) return go_by_steps(PhaseCause::several, t, x);
     if (b == several + 1) return go_by_steps(PhaseCause::no_flow, t, x);
     inclusion().note_faulty(t, x);
-    reason_ = fmt::format("at t = {} the bounds of a reaction form no interval", t);
+    reason_ = fmt::format("at t = {} the bounds of reaction {} form no interval", t,
+                          inclusion().failure().set);
     return end_with(Outcome::not_converged);
 }
 

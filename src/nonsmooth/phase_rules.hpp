@@ -127,6 +127,8 @@ public:
         return !options_.alone && kind_of_guard(which) == BranchPhases::guards_of_reaction;
     }
     [[nodiscard]] GuardInfo guard_info(std::size_t which) const;
+    /// What a guard is about, in messages.
+    [[nodiscard]] std::string name_of(std::size_t which) const;
     /// Whether a guard that watches own phases is enabled.
     [[nodiscard]] bool watches(std::size_t which, Kind kind) const;
     // Guards that watch own phases are evaluated here, and all guards outside explicit phases.

@@ -886,6 +886,10 @@ void PhasedSystem<C>::make_phases()
                                             x.data());
         return me.verdict(of, end.mode, end.t, x);
     };
+    t.name_of = [](void* adapter, std::size_t guard) {
+        const PhasedSystem& me = at(adapter);
+        return me.rules_.name_of(guard - me.guards_);
+    };
     t.reason = [](void* adapter) { return std::string_view(at(adapter).rules_.reason()); };
     t.reaction = [](void* adapter, const PhasePlace<C>& at, std::vector<double>& r) {
         PhasedSystem& me = PhasedSystem::at(adapter);

@@ -81,6 +81,7 @@ struct SizedSystem {
         observe(e);
         g = e.transpose();
     }
+    [[nodiscard]] bool has_own_offset() const { return of->has_offset(); }
     void offset(double t, Reaction& s) const
     {
         const Eigen::Index own = index(of->reactions());

@@ -28,6 +28,7 @@ public:
     [[nodiscard]] virtual std::size_t reactions() const noexcept = 0;
     virtual void smooth(double t, const double* w, double* f) const = 0;
     virtual void bounds(double t, const double* w, double* lower, double* upper) const = 0;
+    [[nodiscard]] virtual bool has_offset() const noexcept = 0;
     /// s, which is zero where it is not written, and its rate.
     virtual void offset(double t, double* s) const = 0;
     virtual void offset_rate(double t, double* rate) const = 0;

@@ -67,6 +67,30 @@ TEST(ContactPhases, AGuardIsLocatedWhileTheContactIsClosed)
     EXPECT_NEAR(run.x[2], 0, 1e-12);
 }
 
+TEST(ContactPhases, AResetThatDrivesABodyIntoItsObstacleEndsTheRun)
+{
+    struct Driven : Puck {
+        double to = 0;
+        static double next_time_event(double t)
+        {
+            return t < 1 ? 1 : std::numeric_limits<double>::infinity();
+        }
+        void time_reset(double, State& x) const { x[1] = to; }
+    };
+    const auto driven = [](double to, double height) {
+        Driven system;
+        system.to = to;
+        return hand_over(system, {0, height}, {0, 0}, {.t_end = 2});
+    };
+    const auto in = driven(-0.2, 0);
+    EXPECT_EQ(in.outcome, Outcome::outside_mode);
+    EXPECT_EQ(in.t, 1);
+    EXPECT_EQ(in.reason, "a reset drives contact 0 into its obstacle at t = 1");
+    EXPECT_EQ(driven(0, 0).outcome, Outcome::reached_end);
+    EXPECT_EQ(driven(0.5, 0).outcome, Outcome::reached_end);
+    EXPECT_EQ(driven(-0.2, 30).outcome, Outcome::outside_mode);
+}
+
 TEST(ContactPhases, AGuardIsWatchedInFlightToo)
 {
     // From 5 m: 0.4 s at 2.5 m/s to the wall, and the impact at 1 s takes 0.2 times 10 m/s of the

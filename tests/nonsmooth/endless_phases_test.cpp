@@ -85,7 +85,7 @@ TEST(EndlessPhases, StepsOfFixedLengthHaveOne)
 TEST(EndlessPhases, ImplicitStepsGoOnUntilAGuardEndsThem)
 {
     // Two contacts with bounds 1 and 3 hold the load t until t = 4; then x = (t - 4)^2 / 2.
-    struct Watched : TwoContacts {
+    struct Watched : TwoContactsOnBelts {
         static std::size_t guard_count() { return 2; }
         static double guard(std::size_t i, double, const State& x)
         {

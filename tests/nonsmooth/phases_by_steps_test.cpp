@@ -396,7 +396,7 @@ TEST(PhasesBySteps, FixedImplicitStepsHaveTheGivenLength)
 {
     // It slips at 4: v(6) = 2. The step in which it slips is not cut, and misses the load of at
     // most its own length twice: 0.01^2.
-    const auto run = fixed_run(TwoContacts{}, TwoContacts::State{0}, {.t_end = 6});
+    const auto run = fixed_run(TwoContactsOnBelts{}, TwoContacts::State{0}, {.t_end = 6});
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_NEAR(run.x[0], 2, 1e-4);
     EXPECT_NEAR(static_cast<double>(run.set_valued.accepted), 400, 20);

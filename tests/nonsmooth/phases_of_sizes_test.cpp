@@ -174,19 +174,106 @@ TEST(PhasesOfSizes, AVetoOfAnImpactOutlastsAStick)
 
 // It slips at 4: v(6) = 2. Implicit steps do not locate the slip; the one across it is shortened
 // until its error is within the tolerance, and no step is longer than 6e-3.
-TEST(PhasesOfSizes, ReactionsOfTheSameMotionAreFollowedByImplicitSteps)
+TEST(PhasesOfSizes, ReactionsOfTheSameMotionOnBeltsAreFollowedByImplicitSteps)
 {
-    const auto run = run_of(TwoContacts{}, TwoContacts::State{0}, until(6));
+    const auto run = run_of(TwoContactsOnBelts{}, TwoContacts::State{0}, until(6));
     ASSERT_EQ(run.outcome, Outcome::reached_end);
     EXPECT_NEAR(run.x[0], 2, 1e-5);
     ASSERT_EQ(run.phases.size(), 2U);
     EXPECT_TRUE(run.phases[0].set_valued);
     EXPECT_NEAR(run.phases[1].from, 4, 0.01);
 
-    Simulation simulation(TwoContacts{}, {0.0}, until(6));
+    Simulation simulation(TwoContactsOnBelts{}, {0.0}, until(6));
     while (simulation.advance()) {
     }
     EXPECT_EQ(simulation.x(), run.x);
+}
+
+TEST(PhasesOfSizes, ReactionsOfTheSameMotionAreHeldAndReleasedTogether)
+{
+    const auto run = run_of(TwoContacts{}, TwoContacts::State{0}, until(6));
+    expect_end(run, TwoContacts::State{2});
+    ASSERT_EQ(run.events.size(), 2U);
+    for (std::size_t k = 0; k < 2; ++k) {
+        EXPECT_EQ(run.events[k].kind, EventKind::slip);
+        EXPECT_EQ(run.events[k].reaction, k);
+        EXPECT_NEAR(run.events[k].t, 4, 1e-12);
+    }
+    EXPECT_EQ(run.set_valued.accepted, 0U);
+}
+
+/// A block under a load with contacts that act with factors c_i and have bounds of their own.
+template <int M>
+struct Contacts {
+    using State = std::array<double, 1>;
+    static constexpr bool resets = false;
+    std::array<double, M> factor, low, high;
+    double rate = 1;
+
+    struct Motion {
+        static constexpr int state_size = 1, reaction_size = M;
+        using Vector = Eigen::Matrix<double, 1, 1>;
+        Contacts of;
+
+        void smooth(double t, const Vector&, Vector& out) const { out[0] = of.rate * t; }
+        void observe(Eigen::Matrix<double, M, 1>& e) const
+        {
+            for (int i = 0; i < M; ++i) e(i, 0) = of.factor[static_cast<std::size_t>(i)];
+        }
+        void act(Eigen::Matrix<double, 1, M>& g) const
+        {
+            for (int i = 0; i < M; ++i) g(0, i) = of.factor[static_cast<std::size_t>(i)];
+        }
+        [[nodiscard]] sets::Box<M> reaction_set(double, const Vector&) const
+        {
+            return sets::Box<M>(of.low, of.high);
+        }
+    };
+    /// What they have together where w > 0 (side -1) or w < 0.
+    [[nodiscard]] double together(int side) const
+    {
+        double sum = 0;
+        for (std::size_t i = 0; i < M; ++i) {
+            const bool lower = (factor[i] > 0) == (side < 0);
+            sum += factor[i] * (lower ? low[i] : high[i]);
+        }
+        return sum;
+    }
+    void flow(double t, const State& x, State& dxdt) const
+    {
+        dxdt[0] = rate * t + together(x[0] >= 0 ? -1 : 1);
+    }
+    [[nodiscard]] Motion set_valued() const { return {*this}; }
+};
+
+// They hold the load t until it is as large as what they have together, l: v = (t - l)^2 / 2.
+TEST(PhasesOfSizes, ReactionsOfTheSameMotionHaveBoundsAndDirectionsOfTheirOwn)
+{
+    const auto expect = [](const auto& contacts) {
+        const double least = contacts.together(-1), most = contacts.together(1);
+        const double load = contacts.rate > 0 ? -least : most, end = load + 1;
+        const auto run = run_of(contacts, std::array<double, 1>{0}, until(end));
+        expect_end(run, std::array<double, 1>{contacts.rate / 2});
+        expect_times(times_of(run.events, EventKind::slip),
+                     std::vector<double>(contacts.factor.size(), load));
+    };
+    for (const double rate : {1.0, -1.0}) {
+        expect(Contacts<2>{{1, 1}, {-1, -2}, {0.5, 1}, rate});
+        expect(Contacts<2>{{1, -2}, {-1, -0.5}, {1, 0.25}, rate});
+        expect(Contacts<3>{{1, 2, 0.5}, {-1, -0.1, -2}, {1, 0.3, 1}, rate});
+        expect(Contacts<4>{{1, 1, -1, 3}, {-1, -0.1, -2, 0}, {1, 0.3, 1, 0.2}, rate});
+    }
+}
+
+TEST(PhasesOfSizes, ReactionsOfTheSameMotionStickTogether)
+{
+    // w' = t - 3 Sgn w from 1.5 comes to rest where t^2 / 2 - 3 t + 1.5 = 0, and slips at 3.
+    const Contacts<2> contacts{{1, 1}, {-1, -2}, {1, 2}};
+    const auto run = run_of(contacts, std::array<double, 1>{1.5}, until(4));
+    expect_end(run, std::array<double, 1>{0.5});
+    const double stops = 3 - std::sqrt(6);
+    expect_times(times_of(run.events, EventKind::stick), {stops, stops});
+    expect_times(times_of(run.events, EventKind::slip), {3, 3});
 }
 
 }  // namespace

@@ -661,5 +661,60 @@ TEST(Phases, BackwardRunsAreRefused)
     EXPECT_NE(refusal([&] { (void)integrate(system, {1}, until(-1)); }), "accepted");
 }
 
+/// Two masses on springs, with friction of combinations of their speeds, and a kick at 1.1.
+struct CoupledMasses {
+    using State = std::array<double, 4>;
+    struct Friction {
+        static constexpr int state_size = 4, reaction_size = 2;
+        using W = Eigen::Vector4d;
+        static void smooth(double t, const W& w, W& f)
+        {
+            f << w[1], std::sin(3 * t) - 2 * w[0] + w[2], w[3], std::cos(2 * t) - 3 * w[2] + w[0];
+        }
+        static void observe(Eigen::Matrix<double, 2, 4>& e) { e << 0, 1, 0, 0.4, 0, -0.3, 0, 1; }
+        [[nodiscard]] static sets::Box<2> reaction_set(double, const W&)
+        {
+            return sets::Box<2>({-1, -0.7}, {1, 0.7});
+        }
+    };
+    static void flow(double t, const State& x, State& dxdt)
+    {
+        Friction::W f;
+        Friction::smooth(t, Friction::W(x.data()), f);
+        const double r0 = x[1] + 0.4 * x[3] >= 0 ? -1 : 1, r1 = x[3] - 0.3 * x[1] >= 0 ? -0.7 : 0.7;
+        dxdt = {f[0], f[1] + r0 - 0.3 * r1, f[2], f[3] + 0.4 * r0 + r1};
+    }
+    static double next_time_event(double t)
+    {
+        return t < 1.1 ? 1.1 : std::numeric_limits<double>::infinity();
+    }
+    static void time_reset(double, State& x) { x[1] += 0.1; }
+    static Friction set_valued() { return {}; }
+};
+
+template <class Method>
+void expect_the_same_bits_from_every_step(const Method& method)
+{
+    using Run = Simulation<CoupledMasses, CoupledMasses::State, Method>;
+    for (const double speed : {0.9, 0.4, -0.3}) {
+        const CoupledMasses::State x0{0, speed, 0.2, -0.5};
+        const auto whole = integrate(CoupledMasses{}, x0, until(6), method);
+        Run simulation(CoupledMasses{}, x0, until(6), method);
+        while (simulation.step()) {
+            Run next(CoupledMasses{}, x0, until(6), method);
+            next.restore(simulation.save());
+            while (next.advance()) {
+            }
+            EXPECT_EQ(next.x(), whole.x) << speed << ' ' << simulation.t();
+        }
+    }
+}
+
+TEST(Phases, SnapshotsGiveTheSameBitsFromEveryStep)
+{
+    expect_the_same_bits_from_every_step(ErrorControlled<Fehlberg78>{});
+    expect_the_same_bits_from_every_step(ErrorControlled<Dopri5>{});
+}
+
 }  // namespace
 }  // namespace ricochet::phases_test

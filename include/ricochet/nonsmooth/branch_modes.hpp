@@ -304,7 +304,7 @@ private:
             if (first_with(i, mask) == i) {
                 held[static_cast<std::size_t>(count++)] = i;
             } else {
-                hold.joint = true;
+                hold.joint = joins_ = true;
             }
         }
         if (count == 0) return;
@@ -369,13 +369,33 @@ private:
     void find_motion(Mode mode, double t, const Vector& w, Motion& out) const
     {
         state_(matrices_.inclusion().system(), terms_, mode, t, w, out);
-        if (!matrices_.traits().gives_static_bound) return;
-        for (Eigen::Index i = 0; i < count(); ++i) {
-            if (!is_held(i, mode)) continue;
-            out.upper[i] = matrices_.inclusion().static_bound(t, w, i);
-            out.lower[i] = -out.upper[i];
+        if (matrices_.traits().gives_static_bound) {
+            for (Eigen::Index i = 0; i < count(); ++i) {
+                if (!is_held(i, mode)) continue;
+                out.upper[i] = matrices_.inclusion().static_bound(t, w, i);
+                out.lower[i] = -out.upper[i];
+            }
         }
-        if (holds(mode)) divide(mask_of(mode), out.upper, out.reaction);
+        if (joins_ && holds(mode)) divide(mask_of(mode), out.lower, out.upper, out.reaction);
+    }
+
+    // --- reactions with the same effect, such as those of two contacts of one block ---
+    //
+    // The first of them that is held stands for all: it has what all have together, between the
+    // sums of their bounds.
+
+    /// Whether all with the effect of reaction i that `at` marks inside have finite bounds.
+    [[nodiscard]] bool join_bounds(const Branches& at, LinearInequality<M>& of) const;
+    /// Sets the branches of those that `mask` holds as their first one has them.
+    void follow_first(std::size_t mask, Branches& branches) const
+    {
+        if (!joins_) return;
+        for (Eigen::Index i = 0; i < count(); ++i) {
+            if (!(mask >> i & 1)) continue;
+            const Eigen::Index first = first_with(i, mask);
+            const int side = static_cast<int>(branches[first]);
+            branches[i] = static_cast<Branch>(times_effect(i, first) > 0 ? side : -side);
+        }
     }
 
     // --- static bounds, see static_bounds.hpp ---
@@ -386,14 +406,19 @@ private:
     /// The first of the reactions of a mask with the effect of reaction i, which is one of them.
     [[nodiscard]] Eigen::Index first_with(Eigen::Index i, std::size_t mask) const
     {
-        if (!matrices_.traits().gives_static_bound) return i;
+        if (!may_join()) return i;
         Eigen::Index j = 0;
         while (!(mask >> j & 1) || times_effect(i, j) == 0) ++j;
         return j;
     }
-    /// Divides what one held reaction has for all with its effect in the ratio of their static
-    /// bounds, so that they meet them together.
-    void divide(std::size_t mask, const Reaction& most, Reaction& r) const;
+    /// Reactions of bodies on belts of different speeds have the same effect, and other y.
+    [[nodiscard]] bool may_join() const noexcept
+    {
+        return matrices_.traits().gives_static_bound || !has_own_offset_;
+    }
+    /// Divides what one held reaction has for all with its effect so that all are at the same part
+    /// of the way between their bounds, and meet them together; those without a bound have all.
+    void divide(std::size_t mask, const Reaction& lower, const Reaction& upper, Reaction& r) const;
 
     /// What acts on reactions whose y is zero.
     struct Loads {
@@ -413,8 +438,18 @@ private:
                                    const Loads& loads) const;
     /// Whether the room of held reaction i below its upper, or above its lower bound will fall from
     /// here: the first of its first two derivatives that is not rounding is negative.
-    [[nodiscard]] bool room_falls(Eigen::Index i, bool upper, Mode mode, double t,
-                                  const Vector& w) const;
+    /// @param noise  below which a change is rounding, in units of `rounding_of_held`
+    [[nodiscard]] bool room_falls(Eigen::Index i, bool upper, Mode mode, double t, const Vector& w,
+                                  double noise) const;
+    /// Whether a held reaction that has met its bound leaves it. It may stay there, or turn back.
+    [[nodiscard]] bool leaves_bound(Eigen::Index i, bool upper, Mode mode, double t,
+                                    const Vector& w) const
+    {
+        const Motion now = motion(mode, t, w);
+        const Slacks room = slacks(now.lower[i], now.upper[i], now.reaction[i]);
+        const bool beyond = !(std::abs(room[upper ? 1 : 0]) <= rounding_at_bound(mode, now));
+        return beyond || room_falls(i, upper, mode, t, w, 1.0 / 16);
+    }
     /// As `settle`; bit i of `fired`: held reaction i has met its static bound.
     [[nodiscard]] Mode settle_static(Branches at, std::size_t fired, double t,
                                      const Vector& w) const;
@@ -523,6 +558,8 @@ private:
         if (is_static(at)) return settle_static(at, 0, t, w);
         LinearInequality<M> inequality;
         state(at, t, w, inequality);
+        const std::size_t mask = mask_of(mode);
+        if (joins_ && !join_bounds(at, inequality)) return no_flow;
         for (Eigen::Index i = 0; i < M; ++i) {
             // A reaction without influence on y' is at one bound or the other.
             if (terms_.delassus(i, i) == 0) inequality.w(i, i) = inequality.no_influence;
@@ -549,11 +586,16 @@ private:
             which = i;
             size = terms;
         }
-        if (doubtful == 0) return checked(mode_of(next));
         if (doubtful > 1) return several;
-        const bool up = r[which] - inequality.lower[which] > inequality.upper[which] - r[which];
-        next[which] = up ? Branch::upper : Branch::lower;
-        return bend(next, which, size, t, w);
+        if (doubtful == 1) {
+            const bool up = r[which] - inequality.lower[which] > inequality.upper[which] - r[which];
+            next[which] = up ? Branch::upper : Branch::lower;
+        }
+        follow_first(mask, next);
+        if (doubtful == 0 || bends(mode_of(next), which, size, t, w)) return checked(mode_of(next));
+        next[which] = Branch::inside;
+        follow_first(mask, next);
+        return checked(mode_of(next));
     }
 
     /// Whether static bounds hold the reactions inside, each of which acts on its y.
@@ -566,13 +608,11 @@ private:
         return true;
     }
 
-    /// The mode when reaction i is at its bound in `next` and y_i does not move: y_i leaves zero if
-    /// it bends away by more than the rounding of its `terms`, and is held otherwise.
-    [[nodiscard]] Mode bend(Branches next, Eigen::Index i, double terms, double t,
-                            const Vector& w) const
+    /// Whether y_i, which does not move, leaves zero where reaction i is at its bound in the mode
+    /// `leaving`: it bends away by more than the rounding of its `terms`.
+    [[nodiscard]] bool bends(Mode leaving, Eigen::Index i, double terms, double t,
+                             const Vector& w) const
     {
-        const bool up = next[i] == Branch::upper;
-        const Mode leaving = mode_of(next);
         State x;
         State dxdt;
         Eigen::Map<Vector>(x.data()) = w;
@@ -589,9 +629,8 @@ private:
         };
         const double bending = rate_of_y(step) - rate_of_y(-step);
         const double noise = 4 * negligible * terms;
-        if (up ? bending < -noise : bending > noise) return checked(leaving);
-        next[i] = Branch::inside;
-        return checked(mode_of(next));
+        return branch(static_cast<std::size_t>(i), leaving) == Branch::upper ? bending < -noise
+                                                                             : bending > noise;
     }
 
     /// Whether the pairs marked inside in `at` lie on these branches by more than rounding.
@@ -619,6 +658,8 @@ private:
     Matrices matrices_;
     BranchTerms<N, M> terms_;
     bool is_unique_ = true;  ///< all principal minors of W are positive
+    bool joins_ = false;     ///< some reactions have the same effect
+    bool has_own_offset_ = false;
     typename Inclusion::Flow::Function flow_ = nullptr;
     typename Inclusion::Table::BranchState state_ = nullptr;
 };
@@ -635,6 +676,7 @@ AnyModes<N, M>::AnyModes(const AnyInclusion<N, M>& inclusion) : matrices_(inclus
     terms_.lever = times(matrices_.inverse_mass(), matrices_.act());
     terms_.delassus = times(matrices_.observe(), terms_.lever);
     for (Eigen::Index i = 0; i < M; ++i) terms_.selected[i] = matrices_.selected(i);
+    has_own_offset_ = inclusion.has_own_offset();
     for (std::size_t mask = 0; mask >> count() == 0; ++mask) prepare(mask);
 }
 

@@ -43,6 +43,10 @@ public:
         heed(of_.callbacks().bounds(user(), mode_, t, w, size(), lower, upper, reactions()),
              "bounds", t);
     }
+    [[nodiscard]] bool has_offset() const noexcept override
+    {
+        return of_.callbacks().offset != nullptr;
+    }
     void offset(double t, double* s) const override
     {
         double rate[detail::most_reactions] = {};

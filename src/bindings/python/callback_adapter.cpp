@@ -603,6 +603,10 @@ public:
         read(PyTuple_GET_ITEM(result.get(), 0), "lower bounds", reactions(), lower);
         read(PyTuple_GET_ITEM(result.get(), 1), "upper bounds", reactions(), upper);
     }
+    [[nodiscard]] bool has_offset() const noexcept override
+    {
+        return static_cast<bool>(of_.offset);
+    }
     void offset(double t, double* s) const override
     {
         if (of_.offset) read(adapter_.call(of_.offset, mode_, t).get(), "offset", reactions(), s);

@@ -275,6 +275,45 @@ TEST(Snapshot, ARunThatWasCancelledGoesOn)
     EXPECT_EQ(run.x, integrate(ball, X{1, 0}, options).x);
 }
 
+/// x'' = sin t - x, with a kick at 0.5. Fehlberg's method evaluates the flow at the start of a step
+/// twice, once of them as a later stage.
+struct Kicked {
+    using State = std::array<double, 2>;
+    static constexpr bool resets = false;
+    static void flow(double t, const State& x, State& dxdt) { dxdt = {x[1], std::sin(t) - x[0]}; }
+    static double guard(double t, const State& x) { return x[0] - 0.1 * std::cos(3 * t); }
+    static GuardInfo guard_info() { return {.crossing = Crossing::either, .resets = false}; }
+    static double next_time_event(double t)
+    {
+        return t < 0.5 ? 0.5 : std::numeric_limits<double>::infinity();
+    }
+    static void time_reset(double, State& x) { x[1] += 0.3; }
+};
+
+template <class Method>
+void expect_the_same_bits_from_every_step(const Method& method)
+{
+    const Options span{.t_end = 9, .rtol = 1e-9, .atol = 1e-11};
+    const Kicked::State x0{1, 0};
+    const auto whole = integrate(Kicked{}, x0, span, method);
+    Simulation<Kicked, Kicked::State, Method> simulation(Kicked{}, x0, span, method);
+    while (simulation.step()) {
+        Simulation<Kicked, Kicked::State, Method> next(Kicked{}, x0, span, method);
+        next.restore(simulation.save());
+        while (next.advance()) {
+        }
+        EXPECT_EQ(next.x(), whole.x) << simulation.t();
+    }
+    EXPECT_EQ(simulation.x(), whole.x);
+}
+
+TEST(Snapshot, GivesTheSameBitsFromEveryStepAfterATimeEvent)
+{
+    expect_the_same_bits_from_every_step(ErrorControlled<Fehlberg78>{});
+    expect_the_same_bits_from_every_step(ErrorControlled<Dopri5>{});
+    expect_the_same_bits_from_every_step(ErrorControlled<CashKarp54>{});
+}
+
 TEST(Snapshot, WhatEndedARunIsKept)
 {
     const Contradiction contradiction;

@@ -106,6 +106,8 @@ struct RICOCHET_ALIGNED InclusionTable {
     void (*act)(System, Action& g) = nullptr;
     void (*offset)(System, double t, Reaction& s) = nullptr;
     void (*offset_rate)(System, double t, Reaction& s) = nullptr;
+    /// Whether the offset is more than that of padded reactions; null: `traits.moves`.
+    bool (*has_own_offset)(System) = nullptr;
 
     // False where the set is faulty. `bounds` is that of a box.
     bool (*project)(System, double t, const State& w, const Reaction& z, Reaction& p) = nullptr;
@@ -191,6 +193,10 @@ public:
     void offset(double t, Reaction& s) const
     {
         if (table_->offset) table_->offset(system(), t, s);
+    }
+    [[nodiscard]] bool has_own_offset() const
+    {
+        return table_->has_own_offset ? table_->has_own_offset(system()) : traits().moves;
     }
     void offset_rate(double t, Reaction& s) const
     {

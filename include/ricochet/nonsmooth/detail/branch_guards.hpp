@@ -107,6 +107,7 @@ template <int N, int M>
 Mode AnyModes<N, M>::reset(const FiredGuards& fired, Mode mode, double t, State& x) const
 {
     Branches branches = branches_of(mode);
+    const std::size_t mask = mask_of(mode);
     int left = 0;
     int arrived = 0;
     Branches held = branches;
@@ -127,23 +128,31 @@ Mode AnyModes<N, M>::reset(const FiredGuards& fired, Mode mode, double t, State&
         held[i] = Branch::inside;
         ++undecided;
     }
+    const bool alone = fired.size() == 1;
     for (const std::size_t which : fired) {
         if (which >= first_set_guard) return empty;
         const auto i = static_cast<Eigen::Index>(which / 4);
+        if (alone && which % 4 >= 2 && !leaves_bound(i, which % 4 == 3, mode, t, w)) return mode;
         if (which % 4 < 2) {
             if (held[i] == Branch::inside) --undecided;
             held[i] = Branch::inside;
             ++arrived;
         } else {
-            branches[i] = which % 4 == 2 ? Branch::lower : Branch::upper;
-            ++left;
+            // Those with the same effect meet their bounds together.
+            const Eigen::Index first = first_with(i, mask);
+            const Branch side = which % 4 == 2 ? Branch::lower : Branch::upper;
+            const bool mirrored = times_effect(i, first) < 0;
+            left += branches[first] == Branch::inside;
+            branches[first] = mirrored ? static_cast<Branch>(-static_cast<int>(side)) : side;
         }
     }
+    Branches after = branches;
+    follow_first(mask, after);
     hold(held, t, w);
     Eigen::Map<Vector>(x.data()) = w;
     if (faulty(t, w) >= 0) return empty;
     if (left + arrived + undecided > 1 && left > 0) return several;
-    if (left == 1) return checked(mode_of(branches));
+    if (left == 1) return checked(mode_of(after));
     return settle(held, t, w);
 }
 

@@ -208,24 +208,25 @@ public:
                                           const double* x1) override
     {
         const Vector w0 = vector(x0), w1 = vector(x1);
+        // A set at the end of the last step has moved the state.
+        if (held_end_.t == t0 && held_end_.w != w0) held_.forget();
         known_.t = t1;
         known_.branches = b;
         known_.w = w1;
         typename Modes::Rooms rooms;
         modes_.rooms(b, t1, w1, known_.motion, rooms);
-        for (const double room : rooms) {
-            if (room < 0) return exits(b, t0, w0, rooms) ? 1 : -1;
+        double fraction = fraction_to({b, t0, t1, w0, w1}, known_.motion.rate, rooms);
+        if (fraction != 1 && this->jumps(t1, x1)) {
+            // A load that jumps at the end of the step belongs to the next one.
+            const double before = std::nextafter(t1, t0);
+            typename Modes::Motion motion;
+            modes_.rooms(b, before, w1, motion, rooms);
+            held_.forget();
+            fraction = fraction_to({b, t0, before, w0, w1}, motion.rate, rooms);
+            // The loop does not see an exit that the jump hides.
+            if (fraction == beyond_at_end) return 0.5;
         }
-        const double fraction = held_.fraction(modes_,
-                                               {.mode = b,
-                                                .t0 = t0,
-                                                .t1 = t1,
-                                                .w0 = w0,
-                                                .w1 = w1,
-                                                .event_tolerance = options_.event_tolerance},
-                                               known_.motion.rate, rooms);
-        held_end_ = {t1, t1 - t0, b, w1};
-        return held_.starts_beyond() ? -1 : fraction;
+        return fraction == beyond_at_end ? 1 : fraction;
     }
 
     // --- implicit phases ---
@@ -408,6 +409,34 @@ private:
         Base::read_state(x, out.data());
         return out;
     }
+
+    struct HeldTo {
+        Mode b;
+        double t0, t1;
+        const Vector &w0, &w1;
+    };
+    /// The fraction of a step with these rooms at its end that would follow the held reactions;
+    /// `beyond_at_end` where one has passed its bound by then, and negative where one was beyond it
+    /// at the start.
+    [[nodiscard]] double fraction_to(const HeldTo& step, const Vector& rate,
+                                     const typename Modes::Rooms& rooms)
+    {
+        const HeldStep<Vector> of{.mode = step.b,
+                                  .t0 = step.t0,
+                                  .t1 = step.t1,
+                                  .w0 = step.w0,
+                                  .w1 = step.w1,
+                                  .event_tolerance = options_.event_tolerance};
+        for (const double room : rooms) {
+            if (!(room < 0)) continue;
+            if (!exits(step.b, step.t0, step.w0, rooms)) return -1;
+            return held_.passes_once(modes_, of, rate, rooms) ? beyond_at_end : 0.5;
+        }
+        const double fraction = held_.fraction(modes_, of, rate, rooms);
+        held_end_ = {step.t1, step.t1 - step.t0, step.b, step.w1};
+        return held_.starts_beyond() ? -1 : fraction;
+    }
+    static constexpr double beyond_at_end = 2;
 
     /// Whether the reactions that are beyond their bounds at the end of a step, which leaves the
     /// `rooms`, were inside at its start: then the loop finds an event.

@@ -49,6 +49,10 @@ public:
     /// Whether no contact pushed in the step that was taken, all are open at (t, x) after it, and
     /// dry friction holds nothing.
     [[nodiscard]] virtual bool is_free(double t, const double* x) const = 0;
+    /// The first contact whose gap is negative at (t, after) and smaller than at (t, before), by
+    /// more than rounding, or -1.
+    [[nodiscard]] virtual int driven_in(double t, const double* before,
+                                        const double* after) const = 0;
     /// Of the step that was taken; zero before the first.
     [[nodiscard]] virtual ContactForces forces() const = 0;
 
@@ -128,6 +132,16 @@ public:
             if (std::fabs(bend) <= 1e-6 && later < -1e-9) return true;
         }
         return false;
+    }
+    [[nodiscard]] int driven_in(double t, const double* before, const double* after) const override
+    {
+        const Vector from = Eigen::Map<const Vector>(before), to = Eigen::Map<const Vector>(after);
+        const double rounding = 1e-12 * (1 + to.template lpNorm<Eigen::Infinity>());
+        for (int c = 0; c < step_.system().contacts && from != to; ++c) {
+            const double gap = step_.system().gap(c, t, to);
+            if (gap < -rounding && gap < step_.system().gap(c, t, from) - rounding) return c;
+        }
+        return -1;
     }
     [[nodiscard]] bool is_free(double t, const double* x) const override
     {

@@ -12,6 +12,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <tuple>
 
 #include "ricochet/nonsmooth/branch_modes.hpp"
 
@@ -69,6 +70,35 @@ public:
         return worst_ <= 1 ? 1 : std::clamp(0.8 / std::sqrt(std::sqrt(worst_)), 0.1, 0.5);
     }
 
+    /// Whether those that are beyond their bounds at the end of a step have passed them once, and
+    /// no other has, as far as samples inside it tell: the exit that is found may else not be the
+    /// first.
+    [[nodiscard]] bool passes_once(const Modes& modes, const Step& step, const Vector& rate,
+                                   const Rooms& rooms)
+    {
+        start_.mode = step.mode;
+        evaluate(modes, step.t0, step.w0, step.h(), start_);
+        End end{step.t1, step.mode, rate, rooms, {}};
+        find_change(modes, step.t1, step.w1, -step.h(), end);
+        std::array<bool, std::tuple_size_v<Rooms>> beyond{};
+        for (const double s : {0.13711, 0.38196601125010515, 0.78934, 1.0}) {
+            if (s < 1) go_inside(modes, step, end.rate, s);
+            const Rooms& here = s < 1 ? rooms_ : rooms;
+            for (std::size_t k = 0; k < here.size(); ++k) {
+                if (std::isinf(here[k])) continue;
+                if (beyond[k] && here[k] >= 0) return false;
+                beyond[k] = here[k] < 0;
+                const double h = step.h();
+                const double off =
+                    std::abs(here[k] - value({start_.rooms[k], end.rooms[k], h * start_.change[k],
+                                              h * end.change[k]},
+                                             s));
+                if (off > std::max(std::abs(start_.rooms[k]), std::abs(end.rooms[k]))) return false;
+            }
+        }
+        return true;
+    }
+
     /// Whether a reaction was beyond its bound at the start of the last step already.
     [[nodiscard]] bool starts_beyond() const noexcept { return starts_beyond_; }
 
@@ -118,17 +148,23 @@ private:
         }
     }
 
-    /// Compares the distances to the bounds at s within the step with their cubics.
-    void compare(const Modes& modes, const Step& step, double s)
+    /// Evaluates the distances to the bounds at s within the step, which ends with a rate.
+    void go_inside(const Modes& modes, const Step& step, const Vector& rate, double s)
     {
         const double h = step.h();
         const std::array<double, 4> at = hermite(s);
         // One component at a time, as they were written: see components.hpp.
         for_each_component(inside_, [&](auto i) {
             inside_[i] = at[0] * step.w0[i] + at[1] * step.w1[i] +
-                         h * (at[2] * start_.rate[i] + at[3] * end_.rate[i]);
+                         h * (at[2] * start_.rate[i] + at[3] * rate[i]);
         });
         modes.rooms(step.mode, step.t0 + s * h, inside_, motion_, rooms_);
+    }
+    /// Compares the distances to the bounds at s within the step with their cubics.
+    void compare(const Modes& modes, const Step& step, double s)
+    {
+        const double h = step.h();
+        go_inside(modes, step, end_.rate, s);
         double rounding = -1;
         for (std::size_t k = 0; k < rooms_.size(); ++k) {
             if (std::isinf(rooms_[k])) continue;

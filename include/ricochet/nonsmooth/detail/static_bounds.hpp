@@ -94,7 +94,8 @@ double AnyModes<N, M>::times_effect(Eigen::Index i, Eigen::Index j) const
 }
 
 template <int N, int M>
-void AnyModes<N, M>::divide(std::size_t mask, const Reaction& most, Reaction& r) const
+void AnyModes<N, M>::divide(std::size_t mask, const Reaction& lower, const Reaction& upper,
+                            Reaction& r) const
 {
     if (!terms_.holds[mask].joint) return;
     const auto is_of = [&](Eigen::Index i, Eigen::Index j) {
@@ -102,21 +103,51 @@ void AnyModes<N, M>::divide(std::size_t mask, const Reaction& most, Reaction& r)
     };
     for (Eigen::Index j = 0; j < count(); ++j) {
         if (!is_of(j, j)) continue;
-        double all = 0, unbounded = 0;
+        double low = 0, width = 0, unbounded = 0;
         for (Eigen::Index i = 0; i < count(); ++i) {
             if (!is_of(i, j)) continue;
-            all += std::abs(times_effect(i, j)) * most[i];
-            if (std::isinf(most[i])) unbounded += std::abs(times_effect(i, j));
+            const double times = times_effect(i, j);
+            const bool bounded = std::isfinite(lower[i]) && std::isfinite(upper[i]);
+            unbounded += bounded ? 0 : std::abs(times);
+            low += times * (times > 0 ? lower[i] : upper[i]);
+            width += std::abs(times) * (upper[i] - lower[i]);
         }
-        if (all == 0) continue;
-        const double part = r[j] / (unbounded > 0 ? unbounded : all);
+        const double all = r[j], part = width > 0 ? (all - low) / width : 0;
         for (Eigen::Index i = 0; i < count(); ++i) {
             if (!is_of(i, j)) continue;
-            // Those without a bound have all.
-            const double weight = unbounded > 0 ? (std::isinf(most[i]) ? 1 : 0) : most[i];
-            r[i] = std::copysign(weight, times_effect(i, j)) * part;
+            const bool bounded = std::isfinite(lower[i]) && std::isfinite(upper[i]);
+            const double times = times_effect(i, j);
+            if (unbounded > 0) {
+                r[i] = bounded ? 0 : std::copysign(1.0, times) * all / unbounded;
+            } else {
+                const double span = upper[i] - lower[i];
+                r[i] = times > 0 ? lower[i] + part * span : upper[i] - part * span;
+            }
         }
     }
+}
+
+template <int N, int M>
+bool AnyModes<N, M>::join_bounds(const Branches& at, LinearInequality<M>& of) const
+{
+    const std::size_t mask = mask_of(mode_of(at));
+    for (Eigen::Index i = 0; i < count(); ++i) {
+        if (!(mask >> i & 1)) continue;
+        const Eigen::Index first = first_with(i, mask);
+        if (first == i) continue;
+        const double times = times_effect(i, first);
+        of.lower[first] += times * (times > 0 ? of.lower[i] : of.upper[i]);
+        of.upper[first] += times * (times > 0 ? of.upper[i] : of.lower[i]);
+        if (!std::isfinite(of.lower[first]) || !std::isfinite(of.upper[first])) return false;
+        // What is left of reaction i has no effect, and no part in what follows.
+        of.w.row(i).setZero();
+        of.w.col(i).setZero();
+        of.w(i, i) = 1;
+        of.y0[i] = 0;
+        of.lower[i] = -1;
+        of.upper[i] = 1;
+    }
+    return true;
 }
 
 template <int N, int M>
@@ -130,13 +161,13 @@ auto AnyModes<N, M>::held_by(const Branches& at, const Reaction& known, const Lo
     const std::size_t mask = mask_of(mode_of(at));
     const Reaction free = loads.rate + times(terms_.delassus, r);
     r -= times(terms_.holds[mask].inverse, free);
-    divide(mask, loads.most, r);
+    divide(mask, -loads.most, loads.most, r);
     return r;
 }
 
 template <int N, int M>
-bool AnyModes<N, M>::room_falls(Eigen::Index i, bool upper, Mode mode, double t,
-                                const Vector& w) const
+bool AnyModes<N, M>::room_falls(Eigen::Index i, bool upper, Mode mode, double t, const Vector& w,
+                                double noise) const
 {
     const Motion now = motion(mode, t, w);
     const TimeScales times(t, largest_component(w), largest_component(now.rate));
@@ -147,7 +178,7 @@ bool AnyModes<N, M>::room_falls(Eigen::Index i, bool upper, Mode mode, double t,
         return slacks(i, mode, t + s, there)[upper ? 1 : 0];
     };
     const double here = room(0), near = room(step), far = room(2 * step);
-    const double noise = 4 * rounding_of_held(mode, now.rate, now.reaction);
+    noise *= rounding_of_held(mode, now.rate, now.reaction);
     const double first = (4 * near - far - 3 * here) / 2;
     if (std::abs(first) > noise) return first < 0;
     return far - 2 * near + here < -noise;
@@ -178,7 +209,7 @@ Mode AnyModes<N, M>::settle_static(Branches at, std::size_t fired, double t, con
             const double located = fired >> i & 1 ? 1e-9 * loads.most[i] : 0;
             const double doubt = std::max(rounding, located);
             const bool leaves =
-                beyond > rounding || (beyond >= -doubt && room_falls(i, r[i] > 0, mode, t, w));
+                beyond > rounding || (beyond >= -doubt && room_falls(i, r[i] > 0, mode, t, w, 4));
             if (!leaves) continue;
             const double before = std::copysign(1.0, r[i]) * from[i];
             const double way = std::abs(r[i]) - before;

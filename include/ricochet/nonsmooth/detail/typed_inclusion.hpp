@@ -451,6 +451,10 @@ public:
                 if constexpr (pads_offset) r.template tail<M - m>().setConstant(-1);
             };
         }
+        out.has_own_offset = [](S s) {
+            if constexpr (requires { at(s).has_own_offset(); }) return at(s).has_own_offset();
+            return static_cast<void>(s), moves;
+        };
         if constexpr (gives_offset_rate) {
             out.offset_rate = [](S s, double t, Reaction& r) {
                 if constexpr (m != M) r.setZero();
