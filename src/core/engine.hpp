@@ -88,7 +88,6 @@ public:
           backward_(options.t_end < options.t_start),
           step_(system_, *setup.kernel, x0, options),
           guards_(system_, GuardRules::of(setup.detector, system_), backward_),
-          search_(system_, x0, guards_.size(), finders_, options_),
           time_events_(system_, backward_, options.continues),
           resets_(x0),
           left_rate_(x0),
@@ -96,6 +95,10 @@ public:
           sets_(x0),
           holds_(system_, step_, guards_, run_.statistics.guard_calls, backward_)
     {
+        // A run in which nothing happens needs no search.
+        if (guarded_ || timed_ || phases_) {
+            search_.emplace(system_, x0, guards_.size(), finders_, options_);
+        }
         const Screening screening = setup.detector.screening;
         guards_.await_series(
             step_, !defers_ && !predicts_ &&
@@ -258,7 +261,7 @@ public:
             return guards_.suspicious(step_.h());
         if (step_.is_hosts_cubic() && guards_.clear_as_cubics(step_.h())) return false;
         check_inside();
-        const bool signs = guards_.has_signs() && search_.checks_signs_closely(step_.h());
+        const bool signs = guards_.has_signs() && search_->checks_signs_closely(step_.h());
         return is_suspicious(signs || (error_controlled_ && hardly_moves()));
     }
 
@@ -395,13 +398,13 @@ public:
 
     /// Time [s] of the set that was found, the offset of it, and the state and mode before it.
     [[nodiscard]] double set_time() const noexcept { return on_time_ ? time_event() : set_time_; }
-    [[nodiscard]] double set_offset() const noexcept { return search_.at(); }
-    [[nodiscard]] const X& before() noexcept { return search_.before(); }
+    [[nodiscard]] double set_offset() const noexcept { return search_->at(); }
+    [[nodiscard]] const X& before() noexcept { return search_->before(); }
     [[nodiscard]] Mode mode_before() const noexcept { return mode_before_; }
     [[nodiscard]] bool is_on_time() const noexcept { return on_time_; }
-    [[nodiscard]] std::span<const std::size_t> fired() noexcept { return search_.fired().span(); }
+    [[nodiscard]] std::span<const std::size_t> fired() noexcept { return search_->fired().span(); }
     /// Keeps what the samples before the set need of its search.
-    void keep_lost() { search_.keep_lost(step_); }
+    void keep_lost() { search_->keep_lost(step_); }
 
     /// Applies the set that was found, which cuts the step short.
     void apply_found();
@@ -515,7 +518,14 @@ public:
     /// @param planned      guards were left alone until their deadlines
     void forget_exception(bool newly_armed, bool planned);
     /// Events that were rejected in searches, and are not yet counted.
-    [[nodiscard]] std::uint64_t& disabled() noexcept { return search_.disabled; }
+    [[nodiscard]] std::uint64_t disabled() const noexcept
+    {
+        return search_ ? search_->disabled : 0;
+    }
+    void set_disabled(std::uint64_t count) noexcept
+    {
+        if (search_) search_->disabled = count;
+    }
 
 private:
     [[nodiscard]] std::uint64_t& calls() noexcept { return run_.statistics.guard_calls; }
@@ -548,13 +558,13 @@ private:
     [[gnu::noinline]] void decide(bool on_time, double t)
     {
         if (resets_.conflict().first != no_guard || shown(resets_.mode()) >= own_modes - 1) return;
-        const PhaseSet<X> set{search_.fired().span(),
+        const PhaseSet<X> set{search_->fired().span(),
                               on_time,
                               std::exchange(on_change_, false),
                               t,
                               step_.mode(),
                               resets_.mode(),
-                              search_.before()};
+                              search_->before()};
         resets_.move_to(phases_->decide(phases_->adapter, set, resets_.after()));
     }
 
@@ -650,22 +660,22 @@ private:
 
     void count_refined() noexcept
     {
-        run_.statistics.refined_steps += search_.refined();
-        run_.statistics.unresolved_steps += search_.unresolved();
+        run_.statistics.refined_steps += search_->refined();
+        run_.statistics.unresolved_steps += search_->unresolved();
     }
 
     /// Counts divided steps as `count_refined` does, for a step that holds no event.
     void count_covered() noexcept
     {
-        run_.statistics.bound_calls += search_.cover().take_enclosed();
-        run_.statistics.refined_steps += search_.cover().refined();
-        run_.statistics.unresolved_steps += search_.cover().unresolved();
+        run_.statistics.bound_calls += search_->cover().take_enclosed();
+        run_.statistics.refined_steps += search_->cover().refined();
+        run_.statistics.unresolved_steps += search_->cover().unresolved();
     }
 
     [[gnu::noinline]] void end_plateaus()
     {
         for (std::size_t i = 0; i < guards_.size(); ++i) {
-            if (guards_.leaves_plateau(i)) search_.end_plateau(step_, guards_, i, calls());
+            if (guards_.leaves_plateau(i)) search_->end_plateau(step_, guards_, i, calls());
         }
     }
 
@@ -728,8 +738,8 @@ private:
     void transform(bool on_time, bool located)
     {
         const double t = on_time ? time_event() : time_of_set();
-        resets_.apply(system_, guards_, {search_.fired().span(), on_time, step_.mode(), t},
-                      search_.before(), Stands{*this, t, located});
+        resets_.apply(system_, guards_, {search_->fired().span(), on_time, step_.mode(), t},
+                      search_->before(), Stands{*this, t, located});
         if (phases_) decide(on_time, t);
     }
 
@@ -738,7 +748,7 @@ private:
     [[nodiscard]] bool still_moves(std::size_t i, Mode mode, const Stands& at, const X& x)
     {
         if (!at.knows_flow() || guards_[i].info.boolean) return true;
-        if (at.located && search_.where(i).jump) return true;
+        if (at.located && search_->where(i).jump) return true;
         X rate = x;
         step_.flow_in(mode, at.t, x, rate);
         const Side left = at.located ? guards_[i].side : opposite(guards_[i].side);
@@ -795,14 +805,14 @@ private:
     /// Value |g| at the set, at time t, before its resets.
     [[nodiscard]] double value_at_set(std::size_t i, double t)
     {
-        return std::fabs(guards_.view(i, step_.mode(), calls()).value(t, search_.before()));
+        return std::fabs(guards_.view(i, step_.mode(), calls()).value(t, search_->before()));
     }
 
     [[nodiscard]] double time_of_set() const noexcept { return set_time_; }
 
     [[nodiscard]] std::size_t first_fired()
     {
-        return search_.fired().empty() ? no_guard : search_.fired()[0];
+        return search_->fired().empty() ? no_guard : search_->fired()[0];
     }
 
     /// Notes that a reset of the set has ended the run.
@@ -1075,7 +1085,7 @@ private:
 
     [[nodiscard]] bool is_member(std::size_t i) noexcept
     {
-        auto& fired = search_.fired();
+        auto& fired = search_->fired();
         return std::find(fired.begin(), fired.end(), i) != fired.end();
     }
 
@@ -1133,7 +1143,7 @@ private:
     bool backward_;
     Step<X> step_;
     GuardTable<X, single> guards_;
-    EventSearch<X, single> search_;
+    std::optional<EventSearch<X, single>> search_;  ///< none where nothing can happen
     std::optional<Planner<X, single>> planner_;
     double h_next_ = 0;        ///< [s] approximate length of the next step
     double last_h_ = 0;        ///< [s] the previous step, or the scale at which guards were armed

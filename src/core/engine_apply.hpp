@@ -12,7 +12,7 @@ inline void EventEngine<X, single>::apply_found()
     begin_set();
     ++run_.statistics.steps;
     count_refined();
-    record_notes(search_.at());
+    record_notes(search_->at());
     apply(true, on_time_);
 }
 
@@ -29,21 +29,21 @@ inline void EventEngine<X, single>::apply(bool located, bool on_time)
         record_time_event(t);
         if (located && !left_known_) leave_from_end();
     }
-    for (const std::size_t i : search_.fired()) record_crossing(i, t, located);
+    for (const std::size_t i : search_->fired()) record_crossing(i, t, located);
     if (phases_) record_changes(t, located);
     if (!goes_on()) {
-        step_.restart(at, search_.before(), step_.mode());
+        step_.restart(at, search_->before(), step_.mode());
         return;
     }
     if (resets_.stops()) note_stop();
     changed_mode_ = resets_.mode() != step_.mode();
     enters_mode_ = shown(resets_.mode()) != shown(step_.mode());
     if (system_->next_time_event_at) {
-        const bool changes = changed_mode_ || !same_state(resets_.after(), search_.before());
+        const bool changes = changed_mode_ || !same_state(resets_.after(), search_->before());
         time_events_.see_set(changes, on_time, located);
     }
     leaves_phase_ = true;
-    if (!holds_.empty()) holds_.release_changed(search_.before(), resets_.after(), changed_mode_);
+    if (!holds_.empty()) holds_.release_changed(search_->before(), resets_.after(), changed_mode_);
     step_.restart(at, resets_.after(), resets_.mode());
     for (const auto& [component, lost] : left_alone_) step_.set_remainder(component, lost);
     if (on_time) {
@@ -59,7 +59,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::note_left_alone(bool located)
 {
     left_alone_.clear();
-    const X& before = search_.before();
+    const X& before = search_->before();
     const X& after = resets_.after();
     if (before.size() != after.size() || before.size() > tolerances::remembered_components) return;
     bool any = false;
@@ -77,7 +77,7 @@ void EventEngine<X, single>::note_lost(const X& before, const X& after, bool loc
         const auto i = static_cast<decltype(before.size())>(c);
         // A component that is zero may have been set to zero.
         if (after[i] != before[i] || after[i] == 0) continue;
-        const double lost = located ? search_.lost_at_set(step_, c) : step_.remainder()[i];
+        const double lost = located ? search_->lost_at_set(step_, c) : step_.remainder()[i];
         if (lost != 0) left_alone_.emplace_back(c, lost);
     }
 }
@@ -86,7 +86,7 @@ template <class X, bool single>
 inline void EventEngine<X, single>::find_tolerance(std::size_t i, double t)
 {
     GuardRecord& record = guards_[i];
-    const Location& where = search_.where(i);
+    const Location& where = search_->where(i);
     record.last.jumped = where.jump;
     if (where.jump) {  // the state is beyond the jump, and the guard is not small there
         record.estimated = false;
@@ -95,8 +95,8 @@ inline void EventEngine<X, single>::find_tolerance(std::size_t i, double t)
     }
     const double residue = system_->bounded ? 2 * std::fabs(where.slope) * where.error : infinity;
     record.estimated = std::isfinite(residue) && !record.info.boolean &&
-                       search_.at() == where.root && !search_.late();
-    const double known = search_.value_at_set(i);
+                       search_->at() == where.root && !search_->late();
+    const double known = search_->value_at_set(i);
     record.noted.value = known == known ? known : value_at_set(i, t);
     record.noted.tolerance =
         record.estimated ? std::max(residue, guards_.touch(i, step_.h())) : record.noted.value;
@@ -111,7 +111,8 @@ inline bool EventEngine<X, single>::goes_on()
         end(Outcome::conflicting_resets, resets_.conflict().first);
     } else if (modes > 0 && resets_.mode() >= modes) {
         end(Outcome::unknown_mode, first_fired());
-    } else if (!fits_dimension(search_.before(), resets_.after(), resets_.mode() == step_.mode())) {
+    } else if (!fits_dimension(search_->before(), resets_.after(),
+                               resets_.mode() == step_.mode())) {
         end(Outcome::wrong_dimension, first_fired());
     } else if (!all_finite(resets_.after())) {
         end_not_finite("reset", first_fired());
@@ -147,8 +148,8 @@ inline bool EventEngine<X, single>::apply_due_time_event()
         end(Outcome::endless_cascade);
         return false;
     }
-    search_.begin(step_.x0());
-    search_.stay_at_start();
+    search_->begin(step_.x0());
+    search_->stay_at_start();
     place_set(step_.instant(0, 0));
     apply_at_start(true);
     return !ended_;
@@ -157,8 +158,8 @@ inline bool EventEngine<X, single>::apply_due_time_event()
 template <class X, bool single>
 inline void EventEngine<X, single>::apply_at_start(bool on_time, double taken)
 {
-    search_.fired().clear();
-    assign(search_.before(), step_.x0());
+    search_->fired().clear();
+    assign(search_->before(), step_.x0());
     leave_from_start(taken);
     if (on_time) note_vetoes();
     if (phases_) place_set(step_.instant(0, 0));
@@ -177,8 +178,8 @@ inline bool EventEngine<X, single>::fire_here(std::size_t i)
     }
     begin_set();
     guards_[i].tolerance = std::fabs(guards_.g0(i));
-    search_.fired().clear();
-    search_.fired().push_back(i);
+    search_->fired().clear();
+    search_->fired().push_back(i);
     return true;
 }
 
@@ -189,9 +190,9 @@ void EventEngine<X, single>::change_phase(const X& x, Mode mode)
     stops_ = false;
     holds_.wake();
     forget_cause();
-    search_.fired().clear();
+    search_->fired().clear();
     leave_from_start(0);
-    assign(search_.before(), step_.x0());
+    assign(search_->before(), step_.x0());
     mode_before_ = step_.mode();
     changed_mode_ = mode != step_.mode();
     enters_mode_ = shown(mode) != shown(step_.mode());

@@ -39,7 +39,7 @@ inline bool EventEngine<X, single>::is_suspicious(bool everywhere)
     if (!guards_.checked()) return guards_.suspicious(step_.h());
     const bool stands = everywhere && step_.stands();
     if (everywhere && !(stands && guards_.are_cubics_of_time())) {
-        X& x = search_.space(step_.x0());
+        X& x = search_->space(step_.x0());
         if (stands) assign(x, step_.x0());
         for (const double u : CubicCheck::places) {
             if (!stands) step_.peek(u * step_.h(), x);
@@ -49,7 +49,7 @@ inline bool EventEngine<X, single>::is_suspicious(bool everywhere)
     }
     if (!guards_.doubtful(step_.h())) return false;
     if (guards_.needs_second_check(step_.h()) && !guards_.sample_doubtful_further(step_, calls())) {
-        X& x = search_.space(step_.x0());
+        X& x = search_->space(step_.x0());
         step_.peek(CubicCheck::further * step_.h(), x);
         guards_.sample_further(step_, x, calls());
     }
@@ -65,7 +65,7 @@ inline void EventEngine<X, single>::check_inside()
         step_.template peek<InsideOf>(x);
         guards_.sample_inside(step_, x, calls());
     } else {
-        X& x = search_.space(step_.x0());
+        X& x = search_->space(step_.x0());
         step_.template peek<InsideOf>(x);
         guards_.sample_inside(step_, x, calls());
     }
@@ -105,34 +105,34 @@ template <class X, bool single>
 template <class Before>
 inline bool EventEngine<X, single>::find(bool cleared, const Before& before_resets)
 {
-    search_.begin(step_.x0());
+    search_->begin(step_.x0());
     if (guards_.waiting()) end_plateaus();
     guards_.begin_search(step_.h());
     for (bool may_tie = true;;) {
-        const bool found = search_.find_set(step_, guards_, ends_at_.time_event, calls());
+        const bool found = search_->find_set(step_, guards_, ends_at_.time_event, calls());
         if (!single && cuts_before_windows_ && found && may_tie && ends_inside_window())
             return false;
         const bool tied = may_tie && add_ties(found);
         if (!found && !tied) break;
         may_tie = may_tie && !tied;
-        if (found && predicts_ && (cleared || search_.late())) ++run_.statistics.missed_events;
-        if (search_.late()) ++run_.statistics.late_events;
+        if (found && predicts_ && (cleared || search_->late())) ++run_.statistics.missed_events;
+        if (search_->late()) ++run_.statistics.late_events;
         dismiss_members();
-        on_time_ = ends_at_.time_event && search_.at() == step_.h();
-        on_change_ = ends_at_.change && search_.at() == step_.h();
-        if (search_.fired().empty() && !(tied && on_time_)) continue;
+        on_time_ = ends_at_.time_event && search_->at() == step_.h();
+        on_change_ = ends_at_.change && search_->at() == step_.h();
+        if (search_->fired().empty() && !(tied && on_time_)) continue;
         const bool met =
-            tied ? search_.meet_conditions_on_time(step_, guards_, calls())
-                 : on_time_ || on_change_ || search_.meet_conditions(step_, guards_, calls());
+            tied ? search_->meet_conditions_on_time(step_, guards_, calls())
+                 : on_time_ || on_change_ || search_->meet_conditions(step_, guards_, calls());
         run_.statistics.unmet_conditions += !met;
         left_known_ = system_->moded || any_stands();
         if (left_known_) {
-            assign(left_rate_, search_.before());
-            step_.flow(search_.at(), search_.before(), left_rate_);
+            assign(left_rate_, search_->before());
+            step_.flow(search_->at(), search_->before(), left_rate_);
             assign(left_start_, step_.rate0());
-            left_after_ = search_.at();
+            left_after_ = search_->at();
         }
-        place_set(step_.instant(search_.at(), search_.at_remainder()));
+        place_set(step_.instant(search_->at(), search_->at_remainder()));
         before_resets();
         note_set();
         transform(on_time_, true);
@@ -146,9 +146,9 @@ inline bool EventEngine<X, single>::find(bool cleared, const Before& before_rese
     }
     note_crossings(step_.h());
     veto_touches(step_.h());
-    if (search_.notes().empty()) {
+    if (search_->notes().empty()) {
         if (asked_ && !cleared) ++run_.statistics.false_alarms;
-        run_.statistics.evidence.add(search_.evidence());
+        run_.statistics.evidence.add(search_->evidence());
     } else {
         record_notes(step_.h());
     }
@@ -161,7 +161,7 @@ template <class X, bool single>
 bool EventEngine<X, single>::ends_inside_window()
 {
     if (ends_on_time() || ends_at_.change) return false;
-    const double first = search_.first_root();
+    const double first = search_->first_root();
     const double t = step_.time(first);
     const double window = resolution_.window(t), before = window / 16;
     if (window == resolution_.blur(t) || first + window <= step_.h()) return false;
@@ -181,14 +181,14 @@ inline bool EventEngine<X, single>::counts_here(std::size_t i)
 template <class X, bool single>
 inline void EventEngine<X, single>::dismiss_members()
 {
-    auto& fired = search_.fired();
+    auto& fired = search_->fired();
     std::size_t kept = 0;
     for (std::size_t k = 0; k < fired.size(); ++k) {
         const std::size_t i = fired[k];
-        const double t = step_.time(search_.at());
-        const Side side = search_.side_left(i);
+        const double t = step_.time(search_->at());
+        const Side side = search_->side_left(i);
         if (guards_[i].side != side) guards_.arm(i, side);
-        if (!system_.enabled_at(i, step_.mode(), t, search_.before())) {
+        if (!system_.enabled_at(i, step_.mode(), t, search_->before())) {
             ++run_.statistics.disabled;
         } else if (repeats(i, t) && !guards_[i].info.unilateral && !turned_back(i)) {
             ++run_.statistics.suppressed;
@@ -197,7 +197,7 @@ inline void EventEngine<X, single>::dismiss_members()
             fired[kept++] = i;
             continue;
         }
-        search_.pass(step_, guards_, i, calls());
+        search_->pass(step_, guards_, i, calls());
     }
     fired.shrink(kept);
 }
@@ -207,19 +207,19 @@ inline bool EventEngine<X, single>::changes_nothing()
 {
     if (cuts_at_all_ || resets_.stops()) return false;
     if (resets_.mode() != step_.mode() || resets_.conflict().first != no_guard) return false;
-    for (const std::size_t i : search_.fired()) {
+    for (const std::size_t i : search_->fired()) {
         // The phases may have decided that a reaction at its bound is held on, from where it is
         // now.
         if (guards_[i].info.unilateral || is_of_phases(i) || ends_run(i)) return false;
     }
-    return same_state(resets_.after(), search_.before());
+    return same_state(resets_.after(), search_->before());
 }
 
 template <class X, bool single>
 bool EventEngine<X, single>::changed_elsewhere()
 {
     if (step_.is_hosts()) return false;
-    const auto fired = search_.fired().span();
+    const auto fired = search_->fired().span();
     const auto resets = [&](std::size_t i) { return guards_[i].info.resets; };
     if (std::none_of(fired.begin(), fired.end(), resets)) return false;
     if (!step_.flow_ends_alike(resets_.scratch())) return true;
@@ -230,7 +230,7 @@ template <class X, bool single>
 bool EventEngine<X, single>::acts_beyond()
 {
     std::uint64_t& count = run_.statistics.ineffective_resets;
-    const auto fired = search_.fired().span();
+    const auto fired = search_->fired().span();
     // A reset that is told the direction of its crossing may be meant for one direction alone.
     const auto is_meant = [this](std::size_t i) {
         const GuardInfo& info = guards_[i].info;
@@ -241,9 +241,9 @@ bool EventEngine<X, single>::acts_beyond()
     const bool asks = system_->moded && system_->reset && !system_->after_set;
     if (!asks || fired.size() > 1 || !guards_[i].info.resets) return false;
     X& x = resets_.scratch();
-    if (kept_.uses_space) search_.put_space_back();
-    const double t = search_.go_beyond(step_, guards_, i, x, calls());
-    if (t == t && resets_.ask_again(system_, i, step_.mode(), t, x, search_.before())) {
+    if (kept_.uses_space) search_->put_space_back();
+    const double t = search_->go_beyond(step_, guards_, i, x, calls());
+    if (t == t && resets_.ask_again(system_, i, step_.mode(), t, x, search_->before())) {
         count -= is_meant(i);
         return true;
     }
@@ -258,31 +258,31 @@ inline bool EventEngine<X, single>::ends_run(std::size_t i) const noexcept
     if (is_of_phases(i)) return false;
     if (options_.stop_at_event) return true;
     return record.info.stop_after > 0 &&
-           record.events + search_.noted(i) + 1 >= record.info.stop_after;
+           record.events + search_->noted(i) + 1 >= record.info.stop_after;
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::go_on_past_members()
 {
-    for (const std::size_t i : search_.fired()) {
+    for (const std::size_t i : search_->fired()) {
         // A crossing that was joined to the end of the run is left to a run that starts there,
         // whose state lies before it.
-        if (!ends_at_.time_event && search_.was_joined(step_, i)) continue;
-        search_.note(i, guards_[i].side, records_states());
-        search_.pass(step_, guards_, i, calls());
+        if (!ends_at_.time_event && search_->was_joined(step_, i)) continue;
+        search_->note(i, guards_[i].side, records_states());
+        search_->pass(step_, guards_, i, calls());
     }
 }
 
 template <class X, bool single>
 inline bool EventEngine<X, single>::bounds_show_event()
 {
-    search_.cover().begin();
+    search_->cover().begin();
     guards_.forget_dips();
     bool any = false;
     for (std::size_t i = 0; i < guards_.size(); ++i) {
         const GuardRecord& record = std::as_const(guards_)[i];
         if (!record.enabled || record.deferred) continue;
-        const bool dips = search_.bounds_show_event(step_, guards_, i, calls());
+        const bool dips = search_->bounds_show_event(step_, guards_, i, calls());
         guards_.note_dip(i, dips);
         any = any || dips;
     }
@@ -292,9 +292,9 @@ inline bool EventEngine<X, single>::bounds_show_event()
 template <class X, bool single>
 inline bool EventEngine<X, single>::doubts_remain()
 {
-    search_.cover().begin();
+    search_->cover().begin();
     guards_.forget_dips();
-    planner_->close_inside(step_, guards_, search_, run_.statistics);
+    planner_->close_inside(step_, guards_, *search_, run_.statistics);
     if (planner_->judged().empty()) {
         count_covered();
         count_deferred(1);
@@ -305,7 +305,7 @@ inline bool EventEngine<X, single>::doubts_remain()
         const bool open =
             guards_.starts_at_event(i, step_) || std::as_const(guards_)[i].info.boolean;
         if (!open) continue;
-        guards_.note_dip(i, search_.bounds_show_event(step_, guards_, i, calls()));
+        guards_.note_dip(i, search_->bounds_show_event(step_, guards_, i, calls()));
     }
     for (const std::size_t i : planner_->judged()) {
         if (guards_.leaves_plateau(i) || guards_.suspicious(i, step_.h())) return true;

@@ -12,7 +12,7 @@ inline void EventEngine<X, single>::note_crossings(double s)
     if (!guards_.suspects().empty()) guards_.complete_rates(step_, calls());
     for (const std::size_t i : guards_.suspects()) {
         if (guards_[i].acting || !guards_.suspicious(i, step_.h())) continue;
-        search_.note_crossings(step_, guards_, i, guards_.end(i, s), calls());
+        search_->note_crossings(step_, guards_, i, guards_.end(i, s), calls());
     }
 }
 
@@ -27,39 +27,39 @@ inline void EventEngine<X, single>::note_set()
         note_ties();
         note_vetoes();
     }
-    for (const std::size_t i : search_.fired()) find_tolerance(i, t);
+    for (const std::size_t i : search_->fired()) find_tolerance(i, t);
     if (guards_.keeps_rows()) note_excursions();
-    veto_touches(search_.at());
-    if (search_.shows_polynomial() && records_states()) step_.prepare_polynomial();
+    veto_touches(search_->at());
+    if (search_->shows_polynomial() && records_states()) step_.prepare_polynomial();
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::keep_suspects()
 {
+    kept_.disabled = run_.statistics.disabled;
+    kept_.disabled_in_search = search_->disabled;
+    kept_.uses_space = false;
     kept_.guards.clear();
     kept_.notes.clear();
-    if (!single || search_.fired().empty()) {
-        for (const std::size_t i : guards_.suspects()) {
-            if (!is_member(i)) kept_.guards.push_back(guards_.keep(i));
-        }
+    if (single && !search_->fired().empty() && search_->notes().empty()) return;
+    for (const std::size_t i : guards_.suspects()) {
+        if (!is_member(i)) kept_.guards.push_back(guards_.keep(i));
     }
-    if (!search_.notes().empty()) kept_.notes = search_.notes();
-    kept_.disabled = run_.statistics.disabled;
-    kept_.disabled_in_search = search_.disabled;
+    if (!search_->notes().empty()) kept_.notes = search_->notes();
     kept_.uses_space = !kept_.guards.empty() || (system_->enabled_at && !kept_.notes.empty());
     if (!kept_.uses_space) return;
-    search_.keep_lost(step_);
-    search_.keep_space();
+    search_->keep_lost(step_);
+    search_->keep_space();
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::put_suspects_back()
 {
-    for (const std::size_t i : search_.fired()) guards_[i].noted.tolerance = 0;
+    for (const std::size_t i : search_->fired()) guards_[i].noted.tolerance = 0;
     for (const auto& guard : kept_.guards) guards_.put_back(guard);
-    search_.notes() = kept_.notes;
+    search_->notes() = kept_.notes;
     run_.statistics.disabled = kept_.disabled;
-    search_.disabled = kept_.disabled_in_search;
+    search_->disabled = kept_.disabled_in_search;
 }
 
 template <class X, bool single>
@@ -70,7 +70,7 @@ inline void EventEngine<X, single>::note_vetoes()
     for (std::size_t i = 0; i < guards_.size(); ++i) {
         const GuardRecord& record = std::as_const(guards_)[i];
         if (!record.acting || !record.enabled || record.info.boolean) continue;
-        const bool vetoed = !system_.enabled_at(i, step_.mode(), t, search_.before());
+        const bool vetoed = !system_.enabled_at(i, step_.mode(), t, search_->before());
         if (vetoed != record.noted.vetoed) guards_[i].noted.vetoed = vetoed;
     }
 }
@@ -78,13 +78,13 @@ inline void EventEngine<X, single>::note_vetoes()
 template <class X, bool single>
 inline void EventEngine<X, single>::note_crossings_to_set()
 {
-    if (search_.fired().size() == guards_.size()) return;
+    if (search_->fired().size() == guards_.size()) return;
     guards_.complete_rates(step_, calls());
     for (const std::size_t i : guards_.suspects()) {
         GuardRecord& record = guards_[i];
-        if (record.examined.from == 0 && search_.comes_later(step_, guards_, i)) continue;
+        if (record.examined.from == 0 && search_->comes_later(step_, guards_, i)) continue;
         if (!guards_.suspicious(i, step_.h()) || is_member(i)) continue;
-        const GuardSample at = search_.sample_at_set(step_, guards_, i, calls());
+        const GuardSample at = search_->sample_at_set(step_, guards_, i, calls());
         constexpr double epsilon = std::numeric_limits<double>::epsilon();
         const double ulp = epsilon * std::fabs(step_.time(at.s));
         const double rounded = std::fabs(at.value) + std::fabs(at.rate) * ulp;
@@ -102,7 +102,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         }
         const bool rests = at.value == 0 && at.rate == 0;  // on its surface, and stays there
         const bool may_cross = !record.info.boolean && !rests && at.s > record.examined.from;
-        const bool with_set = may_cross && (search_.crosses_with_set(step_, guards_, i, at) ||
+        const bool with_set = may_cross && (search_->crosses_with_set(step_, guards_, i, at) ||
                                             is_rounding_at_set(i, at));
         GuardSample last = at;
         // Until it crosses, a guard that crosses with the set is on the side from which it comes,
@@ -110,7 +110,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
         if (with_set) record.noted.tolerance = rounded;
         if (with_set) last.value = -std::copysign(std::numeric_limits<double>::min(), at.rate);
         if (!record.acting) {
-            search_.note_crossings(step_, guards_, i, last, calls());
+            search_->note_crossings(step_, guards_, i, last, calls());
         }
         // An acting guard that has left its side, but was located behind the set, has left it by
         // rounding of its value only: its own event is still to come.
@@ -122,7 +122,7 @@ inline void EventEngine<X, single>::note_crossings_to_set()
             guards_.arm(i, opposite(side));
         } else if (!record.acting) {
             if (counts_at_set(i)) {
-                search_.note_at_set(guards_, i, side, at.rate);
+                search_->note_at_set(guards_, i, side, at.rate);
             } else {
                 guards_.arm(i, opposite(side));
             }
@@ -138,14 +138,14 @@ inline bool EventEngine<X, single>::is_rounding_at_set(std::size_t i, const Guar
     if (guards_[i].acting || has_left(guards_[i].side, at.value)) return false;
     if (!(size <= tolerances::by_rounding * std::max(guards_.scale(i, step_.h()), moves)))
         return false;
-    return size <= rounding_of(i, step_.mode(), step_.time(at.s), search_.before());
+    return size <= rounding_of(i, step_.mode(), step_.time(at.s), search_->before());
 }
 
 template <class X, bool single>
 inline bool EventEngine<X, single>::counts_at_set(std::size_t i)
 {
     const bool enabled =
-        system_.enabled_at(i, step_.mode(), step_.time(search_.at()), search_.before());
+        system_.enabled_at(i, step_.mode(), step_.time(search_->at()), search_->before());
     run_.statistics.disabled += !enabled;
     return enabled;
 }
@@ -172,7 +172,7 @@ inline void EventEngine<X, single>::record_time_event(double t)
             .guard = no_guard,
             .mode_before = step_.mode(),
             .mode_after = resets_.mode(),
-            .before = search_.before(),
+            .before = search_->before(),
             .after = resets_.after(),
             .bracket = {t, t},
             .slope = 0});
@@ -204,18 +204,18 @@ inline void EventEngine<X, single>::record_crossing(std::size_t i, double t, boo
     }
     if (!options_.record_events) return;
     static constexpr Location here{};
-    const Location& where = located ? search_.where(i) : here;
+    const Location& where = located ? search_->where(i) : here;
     record({.t = t,
             .kind = change ? change->kind : kind_of(where),
             .guard = i,
             .mode_before = step_.mode(),
             .mode_after = resets_.mode(),
-            .before = search_.before(),
+            .before = search_->before(),
             .after = resets_.after(),
             .bracket = bracket_of(where, t),
             .slope = where.slope,
             .error = where.error,
-            .late = located && search_.late(),
+            .late = located && search_->late(),
             .reaction = change ? change->reaction : no_reaction});
 }
 
@@ -231,7 +231,7 @@ const ReactionChange* EventEngine<X, single>::change_under(std::size_t guard)
 template <class X, bool single>
 void EventEngine<X, single>::record_changes(double t, bool located)
 {
-    const bool led = !search_.fired().empty() || on_time_;
+    const bool led = !search_->fired().empty() || on_time_;
     for (const ReactionChange& change : phases_->changes(phases_->adapter)) {
         if (change.guard != no_guard) continue;
         ++run_.statistics.events;
@@ -240,13 +240,13 @@ void EventEngine<X, single>::record_changes(double t, bool located)
             if (!led) stopper_ = no_guard;
         }
         const bool found = located && change.fired != no_guard;
-        const Location where = found ? search_.where(change.fired) : Location{};
+        const Location where = found ? search_->where(change.fired) : Location{};
         record({.t = t,
                 .kind = change.kind,
                 .guard = no_guard,
                 .mode_before = step_.mode(),
                 .mode_after = resets_.mode(),
-                .before = search_.before(),
+                .before = search_->before(),
                 .after = resets_.after(),
                 .bracket = found ? bracket_of(where, t) : Bracket{t, t},
                 .slope = where.slope,
@@ -274,8 +274,8 @@ inline void EventEngine<X, single>::record_jump(std::size_t i, Side before)
 template <class X, bool single>
 inline void EventEngine<X, single>::assign_state_of(const Note& note, double s, double t, X& x)
 {
-    if (note.where.root == s && s == search_.at()) {
-        x = search_.before();
+    if (note.where.root == s && s == search_->at()) {
+        x = search_->before();
     } else if (options_.record_steps && note.state == Note{}.state) {
         // The state as the recorded solution has it there.
         x = step_.x0();
@@ -283,14 +283,14 @@ inline void EventEngine<X, single>::assign_state_of(const Note& note, double s, 
         const DenseView<X, false> view(step_.dense(), backward_ ? from - t : t - from);
         for_each_component(x, [&](auto i) { x[i] = view[i]; });
     } else {
-        x = search_.state_at(step_, note);
+        x = search_->state_at(step_, note);
     }
 }
 
 template <class X, bool single>
 inline double EventEngine<X, single>::time_of(const Note& note, double s) const noexcept
 {
-    const double remainder = s == search_.at() ? search_.at_remainder() : 0;
+    const double remainder = s == search_->at() ? search_->at_remainder() : 0;
     const double latest = step_.instant(s, remainder).value;
     const double t = step_.time(note.where.root);
     return backward_ ? std::max(t, latest) : std::min(t, latest);
@@ -303,17 +303,17 @@ inline void EventEngine<X, single>::veto_touches(double s)
     const auto vetoed = [&](const Note& note) {
         if (note.kind != EventKind::touch || note.where.root > s) return false;
         return !system_.enabled_at(note.guard, step_.mode(), time_of(note, s),
-                                   search_.state_at(step_, note));
+                                   search_->state_at(step_, note));
     };
-    run_.statistics.disabled += std::erase_if(search_.notes(), vetoed);
+    run_.statistics.disabled += std::erase_if(search_->notes(), vetoed);
 }
 
 template <class X, bool single>
 inline void EventEngine<X, single>::record_notes(double s)
 {
-    if (search_.notes().empty()) return;
-    search_.keep_notes_until(s);
-    for (const Note& note : search_.notes()) {
+    if (search_->notes().empty()) return;
+    search_->keep_notes_until(s);
+    for (const Note& note : search_->notes()) {
         const double t = time_of(note, s);
         count_event(note.guard, t, note.side);
         if (is_of_phases(note.guard)) continue;
@@ -341,7 +341,7 @@ inline void EventEngine<X, single>::bring_up_to_date()
     run_.statistics.flow_calls = step_.flow_calls();
     run_.statistics.resteps = step_.resteps();
     if (defers_) planner_->add_counts(run_.statistics);
-    run_.statistics.disabled += std::exchange(search_.disabled, 0);
+    if (search_) run_.statistics.disabled += std::exchange(search_->disabled, 0);
     run_.armed_beyond.clear();
     run_.armed_on_surface.clear();
     for (std::size_t i = 0; i < std::min(guards_.size(), own_guards_); ++i) {

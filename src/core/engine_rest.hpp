@@ -11,7 +11,7 @@ inline bool EventEngine<X, single>::rest_fired()
 {
     bool rested = false;
     const bool in_row = guards_.keeps_rows() && prolongs_row();
-    for (const std::size_t i : search_.fired()) {
+    for (const std::size_t i : search_->fired()) {
         ShrinkingIntervals& intervals = guards_[i].intervals;
         const bool again = std::exchange(guards_[i].again, false);
         bool stalls = intervals.stalls(step_.start(), h_next_);
@@ -23,7 +23,7 @@ inline bool EventEngine<X, single>::rest_fired()
         const double tolerance = resolution_.tolerance(step_.start().value);
         const bool resetting = resets_any_ && guards_[i].info.resets;
         if (resetting && located_) {
-            const Location& where = search_.where(i);
+            const Location& where = search_->where(i);
             intervals.blame(std::isfinite(where.error) ? where.error : where.hi - where.lo);
         }
         if (stalls || (resetting && (fades(i) || intervals.accumulate(tolerance)))) {
@@ -53,13 +53,13 @@ bool EventEngine<X, single>::prolongs_row()
     if (!located_) return prolongs_row_at_instant();
     LostRow& row = guards_.row();
     const bool soon = row.follows_soon(step_.start());
-    bool falls = soon && !on_time_ && !search_.fired().empty();
-    for (const std::size_t i : search_.fired()) falls &= this->falls(i, soon);
+    bool falls = soon && !on_time_ && !search_->fired().empty();
+    for (const std::size_t i : search_->fired()) falls &= this->falls(i, soon);
     if (!falls) {
         row.clear();
         return false;
     }
-    for (const std::size_t i : search_.fired()) row.add(guards_[i].excursions);
+    for (const std::size_t i : search_->fired()) row.add(guards_[i].excursions);
     return true;
 }
 
@@ -68,18 +68,18 @@ bool EventEngine<X, single>::prolongs_row_at_instant()
 {
     LostRow& row = guards_.row();
     if (row.is_empty() || on_time_) return false;
-    for (const std::size_t i : search_.fired()) {
+    for (const std::size_t i : search_->fired()) {
         const Excursions& excursions = std::as_const(guards_)[i].excursions;
         // A guard that a reset has carried across its surface has had no excursion to lose.
         const bool stood = std::fabs(guards_.armed_value(i)) <= excursions.rounding();
         const bool has_had_some = excursions.has_fallen() && std::isfinite(excursions.end());
         if (!has_excursions(i) || !has_had_some || !stood) return false;
     }
-    for (const std::size_t i : search_.fired()) {
+    for (const std::size_t i : search_->fired()) {
         guards_[i].excursions.vanish(step_.start().value);
         row.add(guards_[i].excursions);
     }
-    return !search_.fired().empty();
+    return !search_->fired().empty();
 }
 
 template <class X, bool single>
@@ -90,10 +90,10 @@ bool EventEngine<X, single>::falls(std::size_t i, bool soon)
     Excursions& excursions = record.excursions;
     const double interval = guards_.row().interval();
     if (!soon) {
-        excursions.pass(size_of_excursion(i, search_.where(i).slope, interval));
+        excursions.pass(size_of_excursion(i, search_->where(i).slope, interval));
         return false;
     }
-    if (excursions.wants_rounding(size_of_excursion(i, search_.where(i).slope, interval))) {
+    if (excursions.wants_rounding(size_of_excursion(i, search_->where(i).slope, interval))) {
         excursions.set_rounding(record.noted.rounding);
     } else {
         excursions.keep_rounding();
@@ -111,12 +111,12 @@ void EventEngine<X, single>::note_excursions()
 {
     const Instant at = on_time_ ? Instant{time_event(), 0} : Instant{set_time_, set_remainder_};
     if (!guards_.row().would_follow_soon(at)) return;
-    const X& x = search_.before();
+    const X& x = search_->before();
     const double interval = guards_.row().interval_to(at);
-    for (const std::size_t i : search_.fired()) {
+    for (const std::size_t i : search_->fired()) {
         if (!has_excursions(i)) continue;
         GuardRecord& record = guards_[i];
-        double& slope = record.noted.slope = search_.where(i).slope;
+        double& slope = record.noted.slope = search_->where(i).slope;
         const double size = size_of_excursion(i, slope, interval);
         Excursions& excursions = record.excursions;
         const bool wants = excursions.wants_rounding(size);
@@ -296,7 +296,7 @@ inline void EventEngine<X, single>::come_to_rest(std::size_t i, double ahead, do
     if (!holds_.empty()) holds_.release_changed(before, after, enters_mode_);
     step_.restart(ahead, 0, after, mode_after);
     start_beyond_time_event();
-    for (const std::size_t k : search_.fired()) {
+    for (const std::size_t k : search_->fired()) {
         guards_[k].departure.over = stale;
     }
     guards_[i].intervals.come_to_rest();
@@ -331,7 +331,7 @@ void EventEngine<X, single>::release_here(std::size_t k)
     holds_.release(k);
     leaves_phase_ = changed_mode_ = enters_mode_ = false;
     if (!step_.is_of_host()) step_.refresh();
-    search_.fired().clear();
+    search_->fired().clear();
     pending_ = Pending::arm_released;
 }
 

@@ -15,7 +15,7 @@ void EventEngine<X, single>::forget_run()
     holds_.forget();
     time_events_.forget();
     guards_.forget();
-    search_.fired().clear();
+    if (search_) search_->fired().clear();
     pending_ = Pending::nothing;
     sets_.begin_instant();
     if (!defers_) return;
@@ -32,7 +32,7 @@ void EventEngine<X, single>::go_on_from(const StepStart<X>& place)
     ends_at_ = {};
     time_events_.forget_here();
     pending_ = Pending::nothing;
-    if (guarded_) search_.begin(step_.x0());
+    if (guarded_) search_->begin(step_.x0());
     if (defers_) planner_->restore(guards_);
 }
 
@@ -77,8 +77,8 @@ void EventEngine<X, single>::forget_exception(bool newly_armed, bool planned)
     ends_at_ = {};
     time_events_.forget_here();
     if (!guarded_) return;
-    search_.fired().clear();
-    search_.begin(step_.x0());
+    search_->fired().clear();
+    search_->begin(step_.x0());
 }
 
 }  // namespace ricochet::detail

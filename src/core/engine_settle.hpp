@@ -40,11 +40,11 @@ inline bool EventEngine<X, single>::settle()
     if (ended_) return false;
     if (pending_ != Pending::nothing) return true;
     const bool is_due = time_events_.is_due_here();
-    if (!search_.fired().empty()) return apply_next_set(is_due && at_start);
+    if (!search_->fired().empty()) return apply_next_set(is_due && at_start);
     if (!holds_.empty() && release_lifted()) return true;
     if (is_due) return apply_due_time_event();
     if (!holds_.empty()) holds_.review(span_of_rest());
-    assert(search_.fired().empty() && pending_ == Pending::nothing);
+    assert(search_->fired().empty() && pending_ == Pending::nothing);
     return false;
 }
 
@@ -64,9 +64,9 @@ inline bool EventEngine<X, single>::apply_next_set(bool on_time)
         end(Outcome::endless_cascade, guard);
         return false;
     }
-    search_.begin(step_.x0());
-    assign(search_.before(), step_.x0());
-    search_.stay_at_start();
+    search_->begin(step_.x0());
+    assign(search_->before(), step_.x0());
+    search_->stay_at_start();
     place_set(step_.instant(0, 0));
     leave_from_start(0);
     if (on_time) note_vetoes();
@@ -83,8 +83,8 @@ inline bool EventEngine<X, single>::apply_next_set(bool on_time)
     }
     come_to_rest(stuck_, 0, 0);
     if (ended_) return false;
-    search_.fired().clear();
-    search_.fired().push_back(stuck_);
+    search_->fired().clear();
+    search_->fired().push_back(stuck_);
     pending_ = Pending::arm_stuck;
     return true;
 }
@@ -92,7 +92,7 @@ inline bool EventEngine<X, single>::apply_next_set(bool on_time)
 template <class X, bool single>
 inline std::size_t EventEngine<X, single>::endless_guard()
 {
-    const std::span<const std::size_t> fired = search_.fired().span();
+    const std::span<const std::size_t> fired = search_->fired().span();
     for (const std::size_t i : fired) {
         if (sets_.exceeds(guards_[i].here)) return i;
     }
@@ -103,7 +103,7 @@ template <class X, bool single>
 inline std::size_t EventEngine<X, single>::stuck_guard()
 {
     if (resets_.mode() != step_.mode() || !same_state(resets_.after(), step_.x0())) return no_guard;
-    for (const std::size_t i : search_.fired()) {
+    for (const std::size_t i : search_->fired()) {
         if (guards_[i].info.unilateral) return i;
     }
     return no_guard;
@@ -199,7 +199,7 @@ inline void EventEngine<X, single>::have_event(std::size_t i, life::Arming armin
     if (arming == life::Arming::by_condition) {
         fire_by_condition(i);
     } else if (std::as_const(guards_)[i].acting) {
-        search_.fired().push_back(i);
+        search_->fired().push_back(i);
     } else {
         record_jump(i, from);
     }
@@ -211,7 +211,7 @@ inline void EventEngine<X, single>::fire_by_condition(std::size_t i)
     const Side inside = guards_[i].info.crossing == Crossing::falling ? Side::above : Side::below;
     if (guards_[i].acting) {
         guards_.arm(i, opposite(inside));
-        search_.fired().push_back(i);
+        search_->fired().push_back(i);
     } else {
         record_jump(i, inside);
     }
@@ -247,11 +247,11 @@ inline void EventEngine<X, single>::arm_all()
     double widest = 0;
     ++armings_;
     guards_.forget_fired();
-    for (const std::size_t i : search_.fired()) {
+    for (const std::size_t i : search_->fired()) {
         guards_[i].fired = true;
         widest = std::max(widest, guards_[i].tolerance);
     }
-    search_.fired().clear();
+    search_->fired().clear();
     if (system_->moded || holds_.has_changed()) enable_guards();
     guards_.await_none();
     newly_armed_ = true;
@@ -364,7 +364,7 @@ bool EventEngine<X, single>::leaves_here(std::size_t i, Side side)
     if (record.info.boolean || (either && record.fired)) return false;
     const bool is_member = record.fired && resets_any_ && record.info.resets;
     if (!changed_mode_ && !is_member && !is_set_in_motion(i)) return false;
-    const X& left = search_.before();
+    const X& left = search_->before();
     if (left.size() != step_.x0().size()) return false;
     const double t = step_.time(0);
     if (!left_known_) {
@@ -412,7 +412,7 @@ bool EventEngine<X, single>::is_set_in_motion(std::size_t i)
         const double ago = std::fabs(t - std::as_const(guards_)[i].last.t);
         if (!stands(i) || ago <= resolution_.blur(t)) return false;
     }
-    return !(same_state(search_.before(), step_.x0()) && same_state(left_rate_, step_.rate0()));
+    return !(same_state(search_->before(), step_.x0()) && same_state(left_rate_, step_.rate0()));
 }
 
 template <class X, bool single>

@@ -68,14 +68,14 @@ bool EventEngine<X, single>::add_ties(bool found)
     const double h = step_.h();
     bool at_end = false;
     if (found) {
-        const double end = search_.at() + resolution_.window(step_.time(search_.at()));
+        const double end = search_->at() + resolution_.window(step_.time(search_->at()));
         at_end = end >= h;
         if (!at_end) {
             if (!ends_at_.time_event) return false;
-            for (const std::size_t i : search_.fired()) {
+            for (const std::size_t i : search_->fired()) {
                 if (!may_tie(i) || rate_of_tie(i) == 0) return false;
             }
-            search_.stay_at_end(step_);
+            search_->stay_at_end(step_);
             at_end = true;
         }
     }
@@ -84,9 +84,9 @@ bool EventEngine<X, single>::add_ties(bool found)
         if (!may_tie(i) || is_member(i)) continue;
         const double rate = rate_of_tie(i);
         if (rate == 0) continue;
-        if (!added) search_.stay_at_end(step_);
+        if (!added) search_->stay_at_end(step_);
         added = true;
-        if (guards_[i].acting) search_.join_at_end(step_, i, guards_[i].side, rate);
+        if (guards_[i].acting) search_->join_at_end(step_, i, guards_[i].side, rate);
     }
     return added;
 }
@@ -102,7 +102,7 @@ void EventEngine<X, single>::note_ties()
         record.noted.tolerance = 2 * std::fabs(guards_.g1(i));
         const Side side = record.side;
         if (counts_at_set(i)) {
-            search_.note_at_set(guards_, i, side, rate);
+            search_->note_at_set(guards_, i, side, rate);
         } else {
             guards_.arm(i, opposite(side));
         }

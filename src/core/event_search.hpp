@@ -54,9 +54,11 @@ public:
           resolution_(options),
           signs_(finders.detector,
                  system->bounded && !defers(finders.detector, *system.operator->()), options),
-          cover_(system, finders, resolution_),
           evidence_(finders.detector.evidence)
     {
+        if (!single && defers(finders.detector, *system.operator->())) {
+            cover_.emplace(system, finders, resolution_);
+        }
     }
 
     /// Starts on another step; the state may have changed its dimension.
@@ -89,11 +91,21 @@ public:
     [[nodiscard]] Evidence evidence() const noexcept { return evidence_; }
 
     /// Whether the step was divided to resolve a guard, and whether that was not enough.
-    [[nodiscard]] bool refined() const noexcept { return refined_ || cover_.refined(); }
-    [[nodiscard]] bool unresolved() const noexcept { return unresolved_ || cover_.unresolved(); }
+    [[nodiscard]] bool refined() const noexcept
+    {
+        return refined_ || (has_cover() && cover_->refined());
+    }
+    [[nodiscard]] bool unresolved() const noexcept
+    {
+        return unresolved_ || (has_cover() && cover_->unresolved());
+    }
 
-    /// What declared bounds tell of guards inside the current step.
-    [[nodiscard]] StepCover<X, single>& cover() noexcept { return cover_; }
+    /// What declared bounds tell of guards inside the current step, where checks may be deferred.
+    [[nodiscard]] StepCover<X, single>& cover() noexcept
+    {
+        assert(has_cover());
+        return *cover_;
+    }
 
     /// What the bounds of guard i tell of the current step, at whose ends it has these values.
     [[nodiscard]] Covered cover(const CurrentStep& step, const Guards& guards, std::size_t i,
@@ -101,7 +113,7 @@ public:
     {
         const auto guard = guards.view(i, step.mode(), calls);
         const GuardSample from{.s = 0, .value = start}, to{.s = step.h(), .value = end};
-        return cover_.first_event(step, guards, guard, guards[i].side, from, from, to);
+        return cover_->first_event(step, guards, guard, guards[i].side, from, from, to);
     }
 
     /// What enclosures of guard i tell of the current step. @param interval  [s] length of the
@@ -112,8 +124,8 @@ public:
         constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
         const auto guard = guards.view(i, step.mode(), counts.guard_calls);
         const GuardSample from{.s = 0, .value = unknown}, to{.s = step.h(), .value = unknown};
-        cover_.try_first(interval);
-        return cover_.first_event(step, guards, guard, guards[i].side, from, from, to);
+        cover_->try_first(interval);
+        return cover_->first_event(step, guards, guard, guards[i].side, from, from, to);
     }
 
     /// Whether the bounds of guard i, which ends the step on its side, show an event inside.
@@ -122,8 +134,8 @@ public:
     {
         const GuardSample end = guards.end(i, step.h());
         if (guards[i].info.boolean)
-            return cover_.in_use() && changes_inside(step, guards, i, calls);
-        if (!cover_.covers(guards[i]) || !(sign_of(guards[i].side) * end.value > 0)) return false;
+            return has_cover() && cover_->in_use() && changes_inside(step, guards, i, calls);
+        if (!is_covered(guards[i]) || !(sign_of(guards[i].side) * end.value > 0)) return false;
         const auto guard = guards.view(i, step.mode(), calls);
         Probe probe(guard, step, space_);
         return cover_between(probe, guards, guards[i].side, guards.start(i), end).leaves;
@@ -400,6 +412,13 @@ private:
 
     static constexpr int most_rounds = 1'000'000;
 
+    [[nodiscard]] bool has_cover() const noexcept { return !single && cover_; }
+    /// Whether the guard is covered by bounds inside steps.
+    [[nodiscard]] bool is_covered(const GuardRecord& record) const noexcept
+    {
+        return has_cover() && cover_->covers(record);
+    }
+
     /// The hit of a guard of the set.
     [[nodiscard]] Hit& hit_of(std::size_t guard) noexcept
     {
@@ -439,7 +458,7 @@ private:
             return heed(guards, i, watch, next_change(probe, watch, guards, i));
         if (guards.has_series(i))
             return heed(guards, i, watch, next_on_series(probe, watch, guards, i));
-        if (cover_.covers(guards[i]))
+        if (is_covered(guards[i]))
             return heed(guards, i, watch, next_under_bound(probe, watch, guards));
         if (!guards.checked())
             return heed(guards, i, watch, next_by_own_size(probe, watch, guards, i));
@@ -503,7 +522,7 @@ private:
                                         const GuardSample& start, const GuardSample& end)
     {
         if (start.value == 0 && end.value == 0) return {.proved = false};  // it may rest there
-        return cover_.first_event(probe.step(), guards, probe.guard(), side, start, start, end);
+        return cover_->first_event(probe.step(), guards, probe.guard(), side, start, start, end);
     }
 
     [[nodiscard]] static Finding departure(Probe& probe, const Watch& watch, const Covered& covered)
@@ -519,9 +538,9 @@ private:
                                                  const Guards& guards, const Finding& finding,
                                                  const GuardSample& end)
     {
-        if (finding.late || !cover_.covers(guards[probe.guard().which()])) return std::nullopt;
-        const Covered covered = cover_.first_event(probe.step(), guards, probe.guard(), watch.side,
-                                                   watch.start, finding.lo, end);
+        if (finding.late || !is_covered(guards[probe.guard().which()])) return std::nullopt;
+        const Covered covered = cover_->first_event(probe.step(), guards, probe.guard(), watch.side,
+                                                    watch.start, finding.lo, end);
         if (!covered.leaves || !(covered.hi < end.s)) return std::nullopt;
         return departure(probe, watch, covered);
     }
@@ -792,7 +811,7 @@ private:
     /// Adds a hit of an acting guard, and its touches before it.
     void examine(const CurrentStep& step, Guards& guards, std::size_t i, std::uint64_t& calls)
     {
-        const bool covered = cover_.covers(guards[i]);
+        const bool covered = is_covered(guards[i]);
         if (!covered && goes_plainly(guards, i, step.h(), guards.departure(i, step.h()))) {
             return add_hit(
                 i, Finding::leaving(guards[i].side, guards.start(i), guards.end(i, step.h())));
@@ -884,7 +903,7 @@ private:
         const Side side = guards[i].side;
         const GuardSample start = guards.start(i), end = guards.end(i, step.h());
         const double departure = guards.departure(i, step.h());
-        if (!cover_.covers(guards[i]) && goes_plainly(guards, i, step.h(), departure)) {
+        if (!is_covered(guards[i]) && goes_plainly(guards, i, step.h(), departure)) {
             probe.watch(side);
             if (guards.is_cubic(i, departure)) probe.take_as_cubic();
             const double tolerance = std::max(resolution_.tolerance(step.time(step.h())),
@@ -1018,7 +1037,7 @@ private:
     std::vector<X> states_;  ///< of notes
     EventResolution resolution_;
     SignChecks signs_;
-    StepCover<X, single> cover_;
+    std::optional<StepCover<X, single>> cover_;  ///< where checks may be deferred
     ResolvedParts parts_;
     bool refined_ = false;
     bool unresolved_ = false;

@@ -91,7 +91,7 @@ void Loop<X, single>::rewind_counts(const Mark& mark, std::uint64_t steps, std::
     }
     result().statistics.rejected = rejected;
     result().statistics.steps = steps;
-    engine_.disabled() = mark.disabled;
+    engine_.set_disabled(mark.disabled);
 }
 
 /// Drops what has been recorded since the mark.

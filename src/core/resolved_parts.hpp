@@ -2,11 +2,10 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
+#include <boost/container/small_vector.hpp>
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <vector>
 
 #include "ricochet/step_probe.hpp"
 
@@ -27,8 +26,7 @@ public:
     /// The first node beyond offset s and before `end`, else null.
     [[nodiscard]] const GuardSample* next(double s, double end) const noexcept
     {
-        for (std::size_t i = 0; i < count_; ++i) {
-            const GuardSample& node = i < few_.size() ? few_[i] : many_[i - few_.size()];
+        for (const GuardSample& node : nodes_) {
             if (node.s > s) return node.s < end ? &node : nullptr;
         }
         return nullptr;
@@ -49,13 +47,10 @@ private:
 
     void divide(GuardPath& path, const GuardSample& start, const GuardSample& end, double smallest,
                 int depth);
-    void keep(const GuardSample& node);
 
     std::size_t guard_ = none;
-    Watch whole_;                      ///< the interval that is divided
-    std::size_t count_ = 0;            ///< of nodes
-    std::array<GuardSample, 32> few_;  ///< the first of them, without allocation
-    std::vector<GuardSample> many_;    ///< the others
+    Watch whole_;                                            ///< the interval that is divided
+    boost::container::small_vector<GuardSample, 32> nodes_;  ///< the first without an allocation
     double declared_touch_ = 0;
     double noise_ = -1;  ///< of the guard by rounding of the state; below 0: not yet computed
     bool divided_ = false;

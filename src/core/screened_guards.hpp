@@ -213,6 +213,10 @@ public:
     [[nodiscard]] bool suspicious(double h) noexcept
     {
         if (waiting_ && leaves_plateau()) return true;
+        if (single && !series_.coefficients && ends_beyond(0)) {
+            suspect_all();
+            return true;
+        }
         screen(h);
         return !suspects_.empty();
     }

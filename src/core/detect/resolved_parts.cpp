@@ -16,8 +16,7 @@ void ResolvedParts::resolve(GuardPath& path, std::size_t i, const Watch& watch,
     whole_ = watch;
     if (guard_ == i) return;
     guard_ = i;
-    count_ = 0;
-    many_.clear();
+    nodes_.clear();
     divided_ = unresolved_ = nearly_cubic_ = false;
     if (!std::isfinite(start.rate) || !std::isfinite(end.rate)) return;
     noise_ = -1;
@@ -29,7 +28,7 @@ void ResolvedParts::resolve(GuardPath& path, std::size_t i, const Watch& watch,
     for (const double u : CubicCheck::places) {
         const GuardSample node = path.dense_value_and_rate(start.s + u * width);
         divide(path, from, node, smallest, 1);
-        if (node.value != 0) keep(node);
+        if (node.value != 0) nodes_.push_back(node);
         from = node;
     }
     divided_ = true;
@@ -74,18 +73,8 @@ void ResolvedParts::divide(GuardPath& path, const GuardSample& start, const Guar
     // A node that cannot be distinguished from the surface is not used as the end of a part.
     constexpr double ulps = 64 * std::numeric_limits<double>::epsilon();
     const double touch = std::max(declared_touch_, ulps * unit * look.size());
-    if (std::fabs(middle.value) > std::max(noise_, touch)) keep(middle);
+    if (std::fabs(middle.value) > std::max(noise_, touch)) nodes_.push_back(middle);
     divide(path, middle, end, smallest, depth + 1);
-}
-
-void ResolvedParts::keep(const GuardSample& node)
-{
-    if (count_ < few_.size()) {
-        few_[count_] = node;
-    } else {
-        many_.push_back(node);
-    }
-    ++count_;
 }
 
 }  // namespace ricochet::detail

@@ -15,12 +15,15 @@ namespace {
 /// Whether all numbers are plainly in their ranges, as nearly always, in one test.
 [[nodiscard]] bool plainly_valid(const Options& o, bool step_required) noexcept
 {
-    constexpr double infinity = std::numeric_limits<double>::infinity();
-    const auto from_zero = [](double value) { return (value >= 0) & (value < infinity); };
-    return std::isfinite(o.t_end - o.t_start) & from_zero(o.step) &
-           (!step_required | (o.step > 0)) & from_zero(o.rtol) & (o.rtol > 0) & from_zero(o.atol) &
-           from_zero(o.h_min) & (o.h_max > o.h_min) & from_zero(o.event_tolerance) &
-           from_zero(o.event_rtol) & from_zero(o.event_window) & o.component_atol.empty() &
+    // NaN and infinity make the sum something else than a number, and 0 times it not zero.
+    const double sum = (o.step + o.rtol) + (o.atol + o.h_min) + (o.event_tolerance + o.event_rtol) +
+                       o.event_window;
+    double least = o.atol;
+    for (const double number : {o.step, o.h_min, o.event_tolerance, o.event_rtol, o.event_window}) {
+        least = number < least ? number : least;
+    }
+    return (0 * sum == 0) & (0 * (o.t_end - o.t_start) == 0) & (least >= 0) & (o.rtol > 0) &
+           (!step_required | (o.step > 0)) & (o.h_max > o.h_min) & o.component_atol.empty() &
            o.sample_times.empty();
 }
 

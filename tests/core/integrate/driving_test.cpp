@@ -376,6 +376,48 @@ TEST(Driving, ARunWithoutALengthIsExtended)
     check(0.1, FixedStep<Rk4>{});
 }
 
+/// A circle whose flow may be told to throw after one second.
+template <class X>
+struct Circle {
+    using State = X;
+    const bool* throws;
+    void flow(double t, const X& x, X& dxdt) const
+    {
+        if (*throws && t > 1) throw std::runtime_error("told to");
+        dxdt[0] = x[1];
+        dxdt[1] = -x[0];
+    }
+};
+
+template <class X>
+void drive_circle()
+{
+    bool throws = false;
+    const Circle<X> system{&throws};
+    const X start{1, 0};
+    const Options options{.t_end = 3};
+    const auto whole = integrate(system, start, options);
+    Simulation simulation(system, start, options);
+    throws = true;
+    EXPECT_THROW(while (simulation.step()){}, std::runtime_error);
+    throws = false;
+    const Snapshot snapshot = simulation.save();
+    Simulation other(system, start, options);
+    other.restore(snapshot);
+    EXPECT_EQ(other.take().x, whole.x);
+    while (simulation.step()) {
+    }
+    EXPECT_EQ(simulation.x(), whole.x);
+    simulation.restart(0.5, start);
+    EXPECT_EQ(simulation.take().x, integrate(system, start, {.t_start = 0.5, .t_end = 3}).x);
+}
+
+TEST(Driving, ARunWithoutGuardsAndTimeEventsIsDrivenLikeOthers)
+{
+    drive_circle<Two>();
+    drive_circle<std::vector<double>>();
+}
+
 TEST(Driving, ASampleTimeThatIsListedTwiceIsOneStop)
 {
     Simulation simulation(Oscillator{}, Two{1, 0.1}, {.t_end = 1.4, .sample_times = {1, 1.2, 1.2}});

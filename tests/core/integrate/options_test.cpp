@@ -55,6 +55,21 @@ TEST(Options, AnEventToleranceMayNotBeNegative)
     EXPECT_NE(refusal({.t_end = 1, .event_rtol = nan}), "accepted");
 }
 
+TEST(Options, EveryNumberIsFiniteAndNotNegative)
+{
+    for (double Options::*const number :
+         {&Options::step, &Options::rtol, &Options::atol, &Options::h_min,
+          &Options::event_tolerance, &Options::event_rtol, &Options::event_window}) {
+        for (const double value : {nan, infinity, -infinity, -1.0}) {
+            Options options{.t_end = 1};
+            options.*number = value;
+            EXPECT_NE(refusal(options), "accepted") << value;
+        }
+    }
+    // Their sum may overflow.
+    EXPECT_EQ(refusal({.t_end = 1, .rtol = 1e308, .atol = 1e308}), "accepted");
+}
+
 TEST(Options, SampleTimesMustAscendWithinTheRun)
 {
     EXPECT_EQ(refusal({.t_end = 1, .sample_times = {0, 0.5, 0.5, 1}}), "accepted");
