@@ -101,19 +101,21 @@ template <class X, class Array>
         return rough_exp2(std::min(of_last, of_before));
     };
     for (std::size_t i = 0; i < n; ++i) size[i] = std::fabs(x0[i]);
-    double h = longest();
     // A motion that starts near zero and moves away has the size of its end, as with other methods.
     // The length grows at most with the twelfth root of the size: smaller changes need no further
-    // root.
-    for (int again = 0; again < 3; ++again) {
+    // root, and three further ones are enough. (The length is computed in one place, so that
+    // compilers always inline it.)
+    double h = infinity;
+    for (int again = 0;; ++again) {
+        h = longest();
+        if (again == 3 || !(h < infinity)) break;
         bool larger = false;
         for (std::size_t i = 0; i < n; ++i) {
             const double end = std::fabs(x0[i] + std::min(h, 1e100) * c[n + i]);
             larger = larger || end > 16 * size[i];
             size[i] = std::max(size[i], end);
         }
-        if (!larger || !(h < infinity)) break;
-        h = longest();
+        if (!larger) break;
     }
     return {h, apart <= most_apart};
 }
