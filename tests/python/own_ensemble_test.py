@@ -563,3 +563,118 @@ def test_flow_calls_of_differences_are_counted_in_ensembles_of_ready_systems():
     table = {name: [value] for name, value in ricochet.StickSlip().parameters.items()}
     found = ricochet.ensemble(ricochet.StickSlip, table, 1.0, method="rosenbrock4")
     assert found.flow_calls[0] == run.statistics.flow_calls
+
+
+# --- by Taylor's method, four at a time ---
+
+
+def sides(monkeypatch):
+    """Whether each of the ensembles to come was computed side by side."""
+    module, seen = ricochet._rows._ricochet, []
+    whole = module.own_ensemble
+
+    def watched(*given):
+        found = whole(*given)
+        seen.append("side_by_side" in found)
+        return found
+    monkeypatch.setattr(module, "own_ensemble", watched)
+    return seen
+
+
+def has_lanes():
+    """Whether this processor computes four at a time."""
+    import os
+    try:
+        flags = open("/proc/cpuinfo").read()
+    except OSError:
+        return False
+    return "avx2" in flags and os.environ.get("RICOCHET_CODE") != "0"
+
+
+needs_lanes = pytest.mark.skipif(not has_lanes(), reason="this processor has no registers of four doubles")
+
+
+def by_series(system, starts, t_end, **options):
+    """The ensemble, compared with the runs one by one in every bit."""
+    found = ricochet.ensemble(system, starts, t_end, method="taylor", **options)
+    events = found.event_table
+    for i, x0 in enumerate(starts):
+        try:
+            run = ricochet.integrate(system, x0, t_end, method="taylor", **options)
+        except ValueError:
+            assert found.outcome[i] == "failed" and i in found.failures
+            continue
+        assert (found.outcome[i], found.t[i]) == (run.outcome, run.t)
+        assert found.x[i].tobytes() == run.x.tobytes(), i
+        counts = run.statistics
+        assert [found.rows[name][i] for name in ("events", "steps", "flow_calls", "guard_calls")] == [
+            counts.events, counts.steps, counts.flow_calls, counts.guard_calls]
+        own = events[events["row"] == i]
+        for name in run.events.dtype.names:
+            assert own[name].tobytes() == run.events[name].tobytes(), name
+        if "sample_times" in options:
+            assert found.states[i, :len(run.states)].tobytes() == run.states.tobytes()
+    return found
+
+
+def star(**guard):
+    guards = [ricochet.Guard(lambda t, q: q[0], **guard)] if guard else []
+    return ricochet.System(lambda t, q: [q[2], q[3], -q[0] - 2.0 * q[0] * q[1], q[1] * q[1] - q[1] - q[0] * q[0]],
+                           guards, formula=4)
+
+
+ORBITS = np.array([[-0.05, 0.1, 0.3, 0.0006 * i] for i in range(75)])
+
+
+@needs_lanes
+@pytest.mark.parametrize("guard", [{}, {"direction": 1}, {"direction": 0, "reset": lambda t, q: [*q[:2], 0.9 * q[2], q[3]]},
+                                   {"stop_after": 3}])
+@pytest.mark.parametrize("options", [
+    {"rtol": 1e-13, "atol": 1e-13}, {"rtol": 1e-6}, {"t_start": 20.0}, {"sample_times": [0.0, 3.0, 19.0]},
+    {"atol": [1e-9, 1e-10, 1e-9, 1e-11], "h_max": 0.3}])
+def test_rows_side_by_side_have_the_bits_of_runs_alone(guard, options, monkeypatch):
+    seen = sides(monkeypatch)
+    found = by_series(star(**guard), ORBITS, 0.0 if "t_start" in options else 20.0, **options)
+    assert seen == [True] and found.complete
+    assert content(ricochet.ensemble(star(**guard), ORBITS, 0.0 if "t_start" in options else 20.0,
+                                     method="taylor", threads=3, **options)) == content(found)
+
+
+@needs_lanes
+@pytest.mark.parametrize("system, starts", [
+    (ricochet.System(lambda t, x: [x[0] * (1 - x[0]) / (1 + t * t)], [ricochet.Guard(lambda t, x: x[0] - 0.7, direction=1)],
+                     formula=1), np.linspace(0.05, 0.6, 41)[:, None]),
+    (ricochet.System(lambda t, x: [x[1], (1 - x[0] ** 2) * x[1] - x[0] / np.sqrt(1 + x[1] * x[1])],
+                     [ricochet.Guard(lambda t, x: x[0] * x[0] - x[1] / (2 + x[0] ** 2))], formula=2),
+     np.column_stack([np.linspace(0.5, 2, 41), np.linspace(0, 1, 41)])),
+    (ricochet.System(lambda t, x: [10 * (x[1] - x[0]), x[0] * (28 - x[2]) - x[1], x[0] * x[1] - 8 / 3 * x[2]],
+                     [ricochet.Guard(lambda t, x: x[2] - 27, direction=1)], formula=3),
+     np.random.default_rng(2).normal(size=(41, 3))),
+])
+def test_operations_side_by_side_have_the_bits_of_one(system, starts, monkeypatch):
+    seen = sides(monkeypatch)
+    found = by_series(system, starts, 5.0, rtol=1e-12, atol=1e-12)
+    assert seen == [True] and len(found.event_table) > 0
+
+
+@needs_lanes
+def test_rows_that_end_early_or_fail_leave_their_lane(monkeypatch):
+    seen = sides(monkeypatch)
+    blow = ricochet.System(lambda t, x: [x[0] * x[0]], formula=1)
+    starts = np.array([[0.1], [2.0], [np.nan], [0.3], [-1.0], [5.0], [0.0], [np.inf], [0.2]])
+    found = by_series(blow, starts, 1.0)
+    assert seen == [True] and list(found.failures) == [2, 7] and "row 2: ValueError" in found.failures[2]
+    assert {"reached_end", "failed"} < set(found.outcome)
+
+
+def test_what_does_not_fit_side_by_side_is_run_alone(monkeypatch):
+    seen = sides(monkeypatch)
+    swing = ricochet.System(lambda t, x: [x[1], -np.sin(x[0])], formula=2)
+    starts = np.column_stack([np.linspace(0.1, 2.0, 9), np.zeros(9)])
+    by_series(swing, starts, 5.0)  # calls a function
+    fall = ricochet.System(lambda t, x: [x[1], -9.81], formula=2)
+    by_series(fall, starts, 5.0)  # is a polynomial
+    two = ricochet.System(lambda t, x: [x[1], -x[0]], [ricochet.Guard(lambda t, x: x[0]), ricochet.Guard(lambda t, x: x[1])], formula=2)
+    by_series(two, starts, 5.0)
+    by_series(star(direction=1), ORBITS[:9], 5.0, detector="ends")
+    assert seen == [False] * 4

@@ -76,32 +76,22 @@ private:
     std::map<std::size_t, RowFailure> failures_;
 };
 
-/// Runs a table of starts in lanes; a run that has ended is replaced by the next row.
-/// @tparam SystemOf  function that returns the system of a row
-/// @tparam wide  as for `TaylorLanes`
-template <class System, class X, bool wide, class SystemOf, class Detector, class Locator>
+/// Runs rows in lanes; a run that has ended is replaced by the next row.
+/// @tparam Rows  what the rows are: `Parts` of a run, with `setup()` and `adapter()`; `count()`
+/// rows; `open(parts, row)`, `start(row)`, whether a run `shares(adapter)` its series,
+/// `attempt(row, f)` and `keep(row, run)`
+template <class Lanes, class Rows>
 class LaneRuns {
-    static_assert(has_flow_alone<System>());
-    using Stepping = ErrorControlled<Taylor>;
-    using Parts = RunComponents<System, X, Stepping, Detector, Locator>;
-    using C = CoreState<X>;
-    using Lanes = TaylorLanes<System, X, wide>;
+    using Parts = typename Rows::Parts;
+    using C = typename Rows::Start;
 
 public:
-    LaneRuns(const SystemOf& system_of, const std::vector<X>& starts, const Options& options,
-             const Stepping& stepping, const Detector& detector, const Locator& locator)
-        : system_of_(system_of),
-          starts_(starts),
-          options_(options),
-          stepping_(stepping),
-          detector_(detector),
-          locator_(locator),
-          lanes_(options, taylor_order(stepping.value.order, options.rtol)),
-          results_(starts.size())
+    LaneRuns(Lanes& lanes, Rows& rows, const Options& options)
+        : lanes_(lanes), rows_(rows), options_(options)
     {
     }
 
-    [[nodiscard]] Ensemble<Run<X>> take()
+    void run()
     {
         for (std::size_t lane = 0; lane < lane_count; ++lane) fill(lane);
         while (lanes_.active_count() > 1) {
@@ -113,7 +103,6 @@ public:
         for (std::size_t lane = 0; lane < lane_count; ++lane) {
             if (lanes_.is_active(lane)) finish_alone(lane);
         }
-        return results_.take();
     }
 
 private:
@@ -128,25 +117,24 @@ private:
     void fill(std::size_t lane)
     {
         Slot& slot = slots_[lane];
-        while (next_ < starts_.size() && !lanes_.is_active(lane)) {
+        while (next_ < rows_.count() && !lanes_.is_active(lane)) {
             slot.row = next_++;
-            results_.attempt(slot.row, [&] { begin(slot, lane); });
+            rows_.attempt(slot.row, [&] { begin(slot, lane); });
         }
     }
 
     void begin(Slot& slot, std::size_t lane)
     {
-        const X& x0 = starts_[slot.row];
         slot.loop.reset();
-        slot.parts.emplace(system_of_(slot.row), x0, stepping_, detector_, locator_);
+        rows_.open(slot.parts, slot.row);
         const auto setup = slot.parts->setup();
         const auto& adapter =
             static_cast<const typename Lanes::SystemAdapter&>(slot.parts->adapter());
-        if (!setup.quiet || !adapter.as_compiled()) {
-            results_.keep(slot.row, as_callers<X>(run_whole(setup, core_state(x0), options_), x0));
+        if (!setup.quiet || !rows_.shares(adapter)) {
+            rows_.keep(slot.row, run_whole(setup, rows_.start(slot.row), options_));
             return;
         }
-        slot.loop = make_lending_loop(setup, core_state(x0), options_);
+        slot.loop = make_lending_loop(setup, rows_.start(slot.row), options_);
         go_on(slot, lane, false);
     }
 
@@ -157,19 +145,14 @@ private:
             auto& adapter = static_cast<typename Lanes::SystemAdapter&>(slot.parts->adapter());
             lanes_.load(lane, adapter, slot.loop->lend(), slot.quiet);
         } else {
-            end(slot);
+            rows_.keep(slot.row, slot.loop->take());
         }
-    }
-
-    void end(Slot& slot)
-    {
-        results_.keep(slot.row, as_callers<X>(slot.loop->take(), starts_[slot.row]));
     }
 
     void serve(std::size_t lane)
     {
         Slot& slot = slots_[lane];
-        results_.attempt(slot.row, [&] {
+        rows_.attempt(slot.row, [&] {
             lanes_.store(lane, slot.quiet, true);
             slot.loop->take_back(slot.quiet);
             go_on(slot, lane, true);
@@ -180,22 +163,70 @@ private:
     void finish_alone(std::size_t lane)
     {
         Slot& slot = slots_[lane];
-        results_.attempt(slot.row, [&] {
+        rows_.attempt(slot.row, [&] {
             lanes_.store(lane, slot.quiet, false);
             slot.loop->take_back(slot.quiet);
-            end(slot);
+            rows_.keep(slot.row, slot.loop->take());
         });
     }
 
+    Lanes& lanes_;
+    Rows& rows_;
+    const Options& options_;
+    std::array<Slot, lane_count> slots_;
+    std::size_t next_ = 0;  ///< next row to start
+};
+
+/// The rows of a table of starts.
+/// @tparam SystemOf  function that returns the system of a row
+template <class System, class X, class SystemOf, class Detector, class Locator>
+class LaneRows {
+    static_assert(has_flow_alone<System>());
+    using Stepping = ErrorControlled<Taylor>;
+
+public:
+    using Parts = RunComponents<System, X, Stepping, Detector, Locator>;
+    using Start = CoreState<X>;
+
+    LaneRows(const SystemOf& system_of, const std::vector<X>& starts, const Stepping& stepping,
+             const Detector& detector, const Locator& locator)
+        : system_of_(system_of),
+          starts_(starts),
+          stepping_(stepping),
+          detector_(detector),
+          locator_(locator),
+          results_(starts.size())
+    {
+    }
+
+    [[nodiscard]] std::size_t count() const { return starts_.size(); }
+    [[nodiscard]] Start start(std::size_t row) const { return core_state(starts_[row]); }
+    void open(std::optional<Parts>& parts, std::size_t row) const
+    {
+        parts.emplace(system_of_(row), starts_[row], stepping_, detector_, locator_);
+    }
+    template <class Adapter>
+    [[nodiscard]] static bool shares(const Adapter& adapter)
+    {
+        return adapter.as_compiled();
+    }
+    template <class Function>
+    void attempt(std::size_t row, const Function& run)
+    {
+        results_.attempt(row, run);
+    }
+    void keep(std::size_t row, Run<Start>&& run)
+    {
+        results_.keep(row, as_callers<X>(std::move(run), starts_[row]));
+    }
+    [[nodiscard]] Ensemble<Run<X>> take() { return results_.take(); }
+
+private:
     const SystemOf& system_of_;
     const std::vector<X>& starts_;
-    const Options& options_;
     const Stepping& stepping_;
     const Detector& detector_;
     const Locator& locator_;
-    Lanes lanes_;
-    std::array<Slot, lane_count> slots_;
-    std::size_t next_ = 0;  ///< next row to start
     LaneResults<X> results_;
 };
 
@@ -207,9 +238,12 @@ template <class System, class X, class SystemOf, class Detector, class Locator>
 {
     if constexpr (fits_lanes<System, X>()) {
         const auto run = [&]<bool wide>(std::bool_constant<wide>) {
-            return LaneRuns<System, X, wide, SystemOf, Detector, Locator>(
-                       system_of, starts, options, stepping, detector, locator)
-                .take();
+            LaneRows<System, X, SystemOf, Detector, Locator> rows(system_of, starts, stepping,
+                                                                  detector, locator);
+            TaylorLanes<System, X, wide> lanes(options,
+                                               taylor_order(stepping.value.order, options.rtol));
+            LaneRuns(lanes, rows, options).run();
+            return rows.take();
         };
         if (!fuses_products()) {
             if constexpr (!lanes_are_wide) {

@@ -48,7 +48,13 @@ struct Place {
 class Assembler {
 public:
     /// @param buffer  keeps its size
-    explicit Assembler(std::span<std::uint8_t> buffer) noexcept : buffer_(buffer) {}
+    /// @param lanes  doubles side by side in each register and place: 1 or 4
+    explicit Assembler(std::span<std::uint8_t> buffer, int lanes = 1) noexcept
+        : buffer_(buffer),
+          kind_(lanes == 1 ? of_one : of_four),
+          whole_kind_(lanes == 1 ? 1 : of_four)
+    {
+    }
 
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
     [[nodiscard]] std::span<const std::uint8_t> bytes() const noexcept
@@ -81,7 +87,7 @@ public:
     {
         scalar(0x5e, to, left, right);
     }
-    void square_root(Xmm to, Xmm of) { scalar(0x51, to, of, of); }
+    void square_root(Xmm to, Xmm of) { scalar(0x51, to, kind_ == of_one ? of : Xmm{0}, of); }
     void exclusive_or(Xmm to, Xmm left, Xmm right) { vector(0x57, to, left, right); }
 
     // --- addresses and jumps ---
@@ -145,6 +151,11 @@ public:
     }
     void come_here(std::size_t from) { come_from(from, size_); }
     void leave() { put(0xc3); }
+    /// Clears the upper halves of the registers, for code that knows no others.
+    void clear_upper()
+    {
+        for (const int byte : {0xc5, 0xf8, 0x77}) put(byte);
+    }
 
     void put_number(double value) { put_bytes(value); }
     void pad_to(std::size_t multiple)
@@ -192,7 +203,10 @@ private:
         put_bytes(bytes);
     }
 
-    /// Prefix VEX for 128 bits, map 0F. @param kind  1: all of a register, 3: a double
+    // Kinds of operands in prefixes: a double, and four of them.
+    static constexpr int of_one = 3, of_four = 5;
+
+    /// Prefix VEX, map 0F. @param kind  1: all of 128 bits
     void prefix(int kind, int reg, int left, bool upper_operand)
     {
         const int rest = (~left & 15) << 3 | kind;
@@ -219,12 +233,15 @@ private:
     }
     void scalar(int opcode, Xmm reg, Xmm left, const Place& right)
     {
-        prefix(3, reg.number, left.number, number(right.base) > 7);
+        prefix(kind_, reg.number, left.number, number(right.base) > 7);
         put(opcode);
         put_place(reg.number, right);
     }
-    void scalar(int opcode, Xmm reg, Xmm left, Xmm right) { pair(3, opcode, reg, left, right); }
-    void vector(int opcode, Xmm reg, Xmm left, Xmm right) { pair(1, opcode, reg, left, right); }
+    void scalar(int opcode, Xmm reg, Xmm left, Xmm right) { pair(kind_, opcode, reg, left, right); }
+    void vector(int opcode, Xmm reg, Xmm left, Xmm right)
+    {
+        pair(whole_kind_, opcode, reg, left, right);
+    }
     void pair(int kind, int opcode, Xmm reg, Xmm left, Xmm right)
     {
         prefix(kind, reg.number, left.number, right.number > 7);
@@ -246,6 +263,7 @@ private:
     }
 
     std::span<std::uint8_t> buffer_;
+    int kind_, whole_kind_;
     std::size_t size_ = 0;
 };
 

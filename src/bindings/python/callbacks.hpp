@@ -113,6 +113,9 @@ public:
     /// By the loop for up to four components, where no function needs the interpreter.
     [[nodiscard]] std::optional<Record> run_whole(const State& x0, const Request& request,
                                                   SignalWatch& watch) const override;
+    /// Formulas by Taylor's method, of one mode and one guard at most.
+    [[nodiscard]] bool runs_side_by_side(const Request& request, std::size_t n) const override;
+    void run_side_by_side(const Request& request, const Rows& rows) const override;
 
 private:
     friend class CallbackAdapter;

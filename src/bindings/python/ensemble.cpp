@@ -6,13 +6,16 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -180,11 +183,17 @@ Background<EnsembleProgress>::Show shower(const py::object& progress)
     };
 }
 
+/// Keeps what a run has given; one that was cancelled counts as not run.
+void put(Columns& columns, std::size_t row, Record&& record)
+{
+    if (record.outcome != Outcome::cancelled) columns.put(row, std::move(record));
+}
+
 /// Runs the rows of `starts`, in a thread that signals and progress do not wait for.
-/// @param run  (request, row) -> Record, from several threads at a time
-template <class Run>
+/// @param work  (request, columns, options) -> RowsRun
+template <class Work>
 py::dict run_all(const Table& starts, Request&& request, unsigned threads,
-                 const py::object& progress, const Run& run)
+                 const py::object& progress, const Work& work)
 {
     validate(request.options, request.fixed);
     Columns columns(starts.rows(), starts.columns(), request.options.sample_times.size());
@@ -192,22 +201,74 @@ py::dict run_all(const Table& starts, Request&& request, unsigned threads,
     request.options.cancelled = &background.stopped();
     detail::RowsRun rows;
     background.run([&] {
-        rows = detail::run_rows(
-            starts.rows(),
-            [&](const EnsembleRow& row) {
-                Record record = run(request, row.index);
-                if (record.outcome == Outcome::cancelled) return;  // counts as not run
-                columns.put(row.index, std::move(record));
-            },
-            {.threads = threads,
-             .progress = [&](const EnsembleProgress& now) { return background.report(now); },
-             .cancelled = &background.stopped()});
+        rows =
+            work(request, columns,
+                 {.threads = threads,
+                  .progress = [&](const EnsembleProgress& now) { return background.report(now); },
+                  .cancelled = &background.stopped()});
     });
     if (background.raised()) {
         background.raised()->restore();
         throw py::error_already_set();
     }
     return columns.handed_over(rows);
+}
+
+/// The same row by row.
+/// @param run  (request, row) -> Record, from several threads at a time
+template <class Run>
+py::dict run_each(const Table& starts, Request&& request, unsigned threads,
+                  const py::object& progress, const Run& run)
+{
+    return run_all(
+        starts, std::move(request), threads, progress,
+        [&](const Request& all, Columns& columns, const EnsembleOptions& options) {
+            return detail::run_rows(
+                starts.rows(),
+                [&](const EnsembleRow& row) { put(columns, row.index, run(all, row.index)); },
+                options);
+        });
+}
+
+/// Runs rows side by side, in blocks.
+detail::RowsRun run_blocks(const Table& starts, const Source& source, const Request& request,
+                           Columns& columns, const EnsembleOptions& options)
+{
+    // Some for each thread, each of them long compared with its last rows.
+    const std::size_t threads =
+        options.threads > 0 ? options.threads : std::max(std::thread::hardware_concurrency(), 1U);
+    const std::size_t rows = starts.rows();
+    const std::size_t block = std::clamp<std::size_t>(rows / (4 * threads), 32, 256);
+    std::mutex mutex;
+    std::vector<RowFailure> failures;
+    EnsembleOptions of_blocks = options;
+    of_blocks.progress = [&](const EnsembleProgress& now) {
+        return options.progress({.first = now.first * block,
+                                 .count = now.count * block,
+                                 .done = std::min(now.done * block, rows),
+                                 .rows = rows});
+    };
+    detail::RowsRun out = detail::run_rows(
+        (rows + block - 1) / block,
+        [&](const EnsembleRow& of) {
+            const std::size_t first = of.index * block;
+            source.run_side_by_side(
+                request,
+                {.first = first,
+                 .count = std::min(block, rows - first),
+                 .start =
+                     [&](std::size_t row) { return State(starts[row].begin(), starts[row].end()); },
+                 .keep = [&](std::size_t row,
+                             Record&& record) { put(columns, row, std::move(record)); },
+                 .fail =
+                     [&](std::size_t row, const std::exception_ptr& thrown) {
+                         const std::scoped_lock lock(mutex);
+                         failures.push_back({.row = row, .exception = thrown, .message = {}});
+                     }});
+        },
+        of_blocks);
+    out.failures.insert(out.failures.end(), failures.begin(), failures.end());
+    return out;
 }
 
 /// @param names  of the parameters, as in models
@@ -219,16 +280,16 @@ py::dict ready_ensemble(const std::string& system, const std::vector<std::string
     Request request = request_from(options);
     request.options.record_events = false;
     const bool mode_given = options.contains("mode");
-    return run_all(table, std::move(request), threads, progress,
-                   [&](const Request& all, std::size_t row) {
-                       const std::shared_ptr<Source> source = ready_system(system, values[row]);
-                       for (std::size_t i = 0; i < names.size(); ++i) {
-                           source->parameters.emplace(names[i], values[row][i]);
-                       }
-                       Request own = all;
-                       if (!mode_given) own.options.mode = source->start_mode();
-                       return run_row(own, *source, table[row]);
-                   });
+    return run_each(table, std::move(request), threads, progress,
+                    [&](const Request& all, std::size_t row) {
+                        const std::shared_ptr<Source> source = ready_system(system, values[row]);
+                        for (std::size_t i = 0; i < names.size(); ++i) {
+                            source->parameters.emplace(names[i], values[row][i]);
+                        }
+                        Request own = all;
+                        if (!mode_given) own.options.mode = source->start_mode();
+                        return run_row(own, *source, table[row]);
+                    });
 }
 
 /// @param parameters  of formulas, row by row
@@ -241,13 +302,24 @@ py::dict own_ensemble(const std::shared_ptr<Source>& source, const Numbers& para
         throw py::value_error("parameters: found a table of another shape, expected " +
                               std::to_string(source->parameter_count()) + " columns");
     }
-    return run_all(table, request_from(options), threads, progress,
-                   [&](const Request& all, std::size_t row) {
-                       if (source->parameter_count() == 0) return run_row(all, *source, table[row]);
-                       Request own = all;
-                       own.parameters = values[row].data();
-                       return run_row(own, *source, table[row]);
-                   });
+    Request request = request_from(options);
+    if (source->runs_side_by_side(request, table.columns())) {
+        py::dict out =
+            run_all(table, std::move(request), threads, progress,
+                    [&](const Request& all, Columns& columns, const EnsembleOptions& of) {
+                        return run_blocks(table, *source, all, columns, of);
+                    });
+        out["side_by_side"] = true;
+        return out;
+    }
+    return run_each(table, std::move(request), threads, progress,
+                    [&](const Request& all, std::size_t row) {
+                        if (source->parameter_count() == 0)
+                            return run_row(all, *source, table[row]);
+                        Request own = all;
+                        own.parameters = values[row].data();
+                        return run_row(own, *source, table[row]);
+                    });
 }
 
 }  // namespace

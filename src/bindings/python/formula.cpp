@@ -64,9 +64,8 @@ std::vector<double>& scratch()
 
 }  // namespace
 
-void Formula::compute(double t, const double* x, const double* parameters, double* out) const
+void Formula::interpret(double t, const double* x, const double* parameters, double* out) const
 {
-    if (const ValuesCode code = code_->get()) return code(t, x, parameters, out);
     // As many as a method of six stages asks for in fifty steps; less time than the code takes.
     constexpr std::uint32_t enough = 300;
     code_->count(enough, [&] { return code(); });

@@ -55,7 +55,12 @@ public:
 
     /// The values for numbers, by code once there have been many.
     /// @param out  may not overlap x
-    void compute(double t, const double* x, const double* parameters, double* out) const;
+    void compute(double t, const double* x, const double* parameters, double* out) const
+    {
+        if (const ValuesCode code = code_->get()) [[likely]]
+            return code(t, x, parameters, out);
+        interpret(t, x, parameters, out);
+    }
 
     /// Code for `compute`, or nothing.
     [[nodiscard]] MachineCode code() const noexcept { return code_of_values(ops_, outputs_); }
@@ -71,6 +76,8 @@ public:
     }
 
 private:
+    /// By the interpreter, and makes the code when there have been enough.
+    void interpret(double t, const double* x, const double* parameters, double* out) const;
     template <class S, class Xs>
     [[nodiscard]] static S result(const FormulaOp& op, const S& t, const Xs& x,
                                   const double* parameters, const std::vector<S>& values)

@@ -43,6 +43,12 @@ public:
     /// The operations in a mode, recorded once; runs compute with copies.
     /// @throws std::invalid_argument  a constant is not finite; `name` is that of the system
     [[nodiscard]] const detail::LazyTape& tape(Mode mode, const std::string& name) const;
+    /// The code of four motions in the first mode, or null; made when it is first asked for.
+    [[nodiscard]] LanesCode lanes(const std::string& name) const
+    {
+        std::call_once(lanes_asked_, [&] { lanes_ = code_of_lanes(tape(0, name)); });
+        return lanes_.as<LanesCode>();
+    }
     /// Counts a step that was computed by the tape.
     void count(Mode mode, const detail::LazyTape& tape) const noexcept
     {
@@ -71,6 +77,8 @@ private:
     std::vector<const ModedFormula*> guards_;
     const double* parameters_;
     std::vector<std::unique_ptr<InMode>> modes_;
+    mutable std::once_flag lanes_asked_;
+    mutable MachineCode lanes_;
 };
 
 }  // namespace ricochet::python

@@ -118,18 +118,24 @@ public:
     /// The function, or nothing.
     [[nodiscard]] MachineCode finish()
     {
-        pad_to(sizeof(double));
+        pad_to(static_cast<std::size_t>(each_));
         come_here(constants_at_);
-        for (const double value : constants_) put_number(value);
+        for (const double value : constants_) {
+            for (int lane = 0; lane < each_; lane += 8) put_number(value);
+        }
         return MachineCode(bytes());
     }
 
 protected:
     /// @param pool  the register with the address of the constants
-    Emitter(std::span<std::uint8_t> buffer, General pool) : Assembler(buffer), pool_(pool)
+    Emitter(std::span<std::uint8_t> buffer, General pool, int lanes = 1)
+        : Assembler(buffer, lanes), pool_(pool), each_(8 * lanes)
     {
         forget();
     }
+
+    /// Bytes of a value.
+    [[nodiscard]] int each() const noexcept { return each_; }
 
     /// A value that has a place in memory: number `of`, coefficient k.
     struct Value {
@@ -145,7 +151,7 @@ protected:
         const auto found = std::ranges::find_if(constants_, same);
         const auto number = static_cast<std::int32_t>(found - constants_.begin());
         if (found == constants_.end()) constants_.push_back(value);
-        return {pool_, 8 * number};
+        return {pool_, each_ * number};
     }
 
     // The newest results are in registers 2 to 15, one after the other.
@@ -190,6 +196,7 @@ private:
     static constexpr int first_held = 2;
 
     General pool_;
+    int each_;
     std::size_t constants_at_ = 0;
     std::vector<double> constants_;
     Held held_{};
@@ -322,8 +329,9 @@ constexpr std::size_t most_series_operations = 50;
 
 class SeriesEmitter : public Emitter {
 public:
-    SeriesEmitter(std::span<std::uint8_t> buffer, const LazyTape& tape)
-        : Emitter(buffer, General::r14),
+    /// @param lanes  motions side by side, 1 or 4; of 4 the time is in memory, as the state is
+    SeriesEmitter(std::span<std::uint8_t> buffer, const LazyTape& tape, int lanes)
+        : Emitter(buffer, General::r14, lanes),
           of_(tape),
           tape_(tape.tape()),
           n_(static_cast<int>(tape.states())),
@@ -350,7 +358,7 @@ public:
     {
         const int most = of_.is_polynomial() ? of_.degree() : detail::most_taylor_order;
         if (!straight_) emit_sums(most);
-        enter((columns_ * stride * 8 + 63) / 64 * 64);
+        enter((columns_ * stride * each() + 63) / 64 * 64);
         start();
         for (int k = 0; k < most; ++k) {
             for (int i = n_ + 1; i < count(); ++i) compute(i, k);
@@ -408,14 +416,23 @@ private:
         take_from_stack(size);
         align_stack();
         move(General::rbx, General::rsp);
-        move(General::r12, General::rdx);
-        move(General::r13, General::rcx);
-        move(General::r15, General::rsi);
+        if (each() == 8) {
+            move(General::r12, General::rdx);
+            move(General::r13, General::rcx);
+            move(General::r15, General::rsi);
+        } else {
+            load(xmm0, {General::rdi, 0});
+            move(General::rdi, General::rsi);
+            move(General::r12, General::rcx);
+            move(General::r13, General::r8);
+            move(General::r15, General::rdx);
+        }
         find_constants();
     }
     void return_with(int order)
     {
         set(General::rax, order);
+        if (each() != 8) clear_upper();
         address(General::rsp, {General::rbp, -8 * static_cast<int>(saved.size())});
         for (std::size_t i = saved.size(); i-- > 0;) pop(saved[i]);
         pop(General::rbp);
@@ -426,7 +443,7 @@ private:
 
     [[nodiscard]] Place place(const Value& value)
     {
-        return {General::rbx, 8 * (value.of * stride + value.k)};
+        return {General::rbx, each() * (value.of * stride + value.k)};
     }
     /// Coefficients beyond a degree are zeros, as in the rows of the interpreter.
     [[nodiscard]] bool is_zero(const Value& value) const
@@ -488,8 +505,8 @@ private:
             for (int i = 0; i <= last; ++i) {
                 const int j = detail::outward(0, last, i);
                 const Xmm to = i == 0 ? xmm0 : xmm1;
-                load(to, {General::rax, 8 * j});
-                multiply(to, to, Place{General::rcx, -8 * j});
+                load(to, {General::rax, each() * j});
+                multiply(to, to, Place{General::rcx, -each() * j});
                 if (i > 0) add(xmm0, xmm0, xmm1);
             }
             leave();
@@ -536,9 +553,9 @@ private:
         if (slope(n_) >= 0) store(place({slope(n_), 1}), xmm0);
         for (int i = 0; i < n_; ++i) {
             const Xmm x = take();
-            load(x, {General::rdi, 8 * i});
+            load(x, {General::rdi, each() * i});
             store(place({i, 0}), x);
-            store({General::r12, 8 * i}, x);
+            store({General::r12, each() * i}, x);
             hold({i, 0});
         }
     }
@@ -594,7 +611,7 @@ private:
         const Xmm from = loaded({rate, k}, next);
         divide(next, from, constant(k + 1));
         store(place({j, k + 1}), next);
-        store({General::r12, 8 * ((k + 1) * n_ + j)}, next);
+        store({General::r12, each() * ((k + 1) * n_ + j)}, next);
         hold({j, k + 1});
         keep_slope(j, k + 1, next);
     }
@@ -603,7 +620,7 @@ private:
         for (int j = 0; j < m_; ++j) {
             const int guard = tape_.outputs[static_cast<std::size_t>(n_ + j)];
             const Xmm value = loaded({guard, k}, xmm0);
-            store({General::r13, 8 * (k * m_ + j)}, value);
+            store({General::r13, each() * (k * m_ + j)}, value);
         }
     }
     void end(int order)
@@ -833,16 +850,35 @@ MachineCode code_of_values(std::span<const FormulaOp> ops,
     }
 }
 
-MachineCode code_of_series(const LazyTape& tape) noexcept
+namespace {
+
+MachineCode series_of(const LazyTape& tape, int lanes) noexcept
 {
     if (!may_make_code() || tape.operations() > most_series_operations) return {};
     try {
-        SeriesEmitter emitter(scratch(), tape);
+        SeriesEmitter emitter(scratch(), tape, lanes);
         emitter.emit();
         return emitter.finish();
     } catch (...) {
         return {};
     }
+}
+
+}  // namespace
+
+MachineCode code_of_series(const LazyTape& tape) noexcept
+{
+    return series_of(tape, 1);
+}
+
+MachineCode code_of_lanes(const LazyTape& tape) noexcept
+{
+    const auto& ops = tape.tape().ops;
+    const bool has_calls = std::ranges::any_of(ops, [](const TapeOp& op) {
+        return function_of_one(op.op) || op.op == TaylorOp::power || op.op == TaylorOp::angle;
+    });
+    if (has_calls || !__builtin_cpu_supports("avx2")) return {};
+    return series_of(tape, 4);
 }
 
 #else
@@ -859,6 +895,10 @@ MachineCode code_of_values(std::span<const FormulaOp> /*ops*/,
     return {};
 }
 MachineCode code_of_series(const detail::LazyTape& /*tape*/) noexcept
+{
+    return {};
+}
+MachineCode code_of_lanes(const detail::LazyTape& /*tape*/) noexcept
 {
     return {};
 }

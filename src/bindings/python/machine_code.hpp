@@ -21,6 +21,9 @@ using ValuesCode = void (*)(double t, const double* x, const double* parameters,
 /// Coefficients as by `detail::LazyTape::compute`, whose number is returned.
 using SeriesCode = int (*)(double t, const double* x, int order, double* out, double* guards);
 
+/// The same of four motions, whose numbers lie side by side.
+using LanesCode = int (*)(const double* t, const double* x, int order, double* out, double* guards);
+
 /// Executable memory with a function, or nothing.
 class MachineCode {
 public:
@@ -63,5 +66,8 @@ private:
 
 /// A `SeriesCode`, or nothing: tapes of many operations are computed faster side by side.
 [[nodiscard]] MachineCode code_of_series(const detail::LazyTape& tape) noexcept;
+
+/// A `LanesCode`, or nothing: also where functions of the mathematical library are called.
+[[nodiscard]] MachineCode code_of_lanes(const detail::LazyTape& tape) noexcept;
 
 }  // namespace ricochet::python

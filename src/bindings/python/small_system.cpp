@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
+#include <exception>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -15,6 +18,7 @@
 #include "ricochet/detail/system_adapter.hpp"
 #include "ricochet/extremum.hpp"
 #include "ricochet/locators.hpp"
+#include "ricochet/taylor/lanes.hpp"
 #include "ricochet/taylor/taylor.hpp"
 
 namespace ricochet::python {
@@ -219,13 +223,19 @@ namespace {
 
 using detail::SmallState;
 
+[[nodiscard]] SmallState small_state(const State& x)
+{
+    SmallState out(x.size());
+    std::ranges::copy(x, out.data());
+    return out;
+}
+
 /// All parts of a run but its steps.
 class SmallRun {
 public:
     SmallRun(const SmallSystem& system, const State& x0, const Request& request)
-        : table_(system.table()), start_(x0.size()), options_(request.options)
+        : table_(system.table()), start_(small_state(x0)), options_(request.options)
     {
-        std::ranges::copy(x0, start_.data());
         setup_.system = &table_;
         setup_.cancels_by_itself = true;
         setup_.detector =
@@ -245,16 +255,26 @@ public:
         return record_of(detail::run_whole(setup_, start_, options_));
     }
 
+    /// The parts of a run by Taylor's method.
+    template <std::size_t n>
+    [[nodiscard]] const detail::RunBindings<SmallState>& parts_of_series(
+        detail::StepperAdapter<SmallSystem, SmallState, detail::TaylorOf<n>>& adapter)
+    {
+        setup_.adapter = static_cast<detail::SystemAdapter<SmallSystem, SmallState>*>(&adapter);
+        setup_.stepping = detail::written_type<ErrorControlled<Taylor>>();
+        detail::step_by_series<SmallSystem, SmallState, n>(setup_);
+        return setup_;
+    }
+
     template <std::size_t n>
     [[nodiscard]] Record by_series(const SmallSystem& system)
     {
         detail::StepperAdapter<SmallSystem, SmallState, detail::TaylorOf<n>> adapter(system,
                                                                                      start_);
-        setup_.adapter = static_cast<detail::SystemAdapter<SmallSystem, SmallState>*>(&adapter);
-        setup_.stepping = detail::written_type<ErrorControlled<Taylor>>();
-        detail::step_by_series<SmallSystem, SmallState, n>(setup_);
-        return record_of(detail::run_whole(setup_, start_, options_));
+        return record_of(detail::run_whole(parts_of_series(adapter), start_, options_));
     }
+
+    [[nodiscard]] const SmallState& start() const noexcept { return start_; }
 
 private:
     detail::SystemTable<SmallState> table_;
@@ -284,6 +304,148 @@ std::optional<Record> CallbackSource::run_whole(const State& x0, const Request& 
         case 2: return run.by_series<2>(system);
         case 3: return run.by_series<3>(system);
         default: return run.by_series<4>(system);
+    }
+}
+
+namespace {
+
+/// A run by Taylor's method whose steps are taken together with those of others.
+template <std::size_t n>
+class LaneParts {
+public:
+    LaneParts(const CallbackSource& source, const Request& request, const FormulaSeries& series,
+              const State& x0)
+        : system_(source, n, nullptr, &series, watch_),
+          run_(system_, x0, request),
+          adapter_(system_, run_.start()),
+          setup_(run_.parts_of_series(adapter_))
+    {
+    }
+
+    [[nodiscard]] const detail::RunBindings<SmallState>& setup() const noexcept { return setup_; }
+    [[nodiscard]] auto& adapter() noexcept { return adapter_; }
+
+private:
+    SignalWatch watch_;
+    SmallSystem system_;
+    SmallRun run_;
+    detail::StepperAdapter<SmallSystem, SmallState, detail::TaylorOf<n>> adapter_;
+    const detail::RunBindings<SmallState>& setup_;
+};
+
+/// The rows of an ensemble, for `detail::LaneRuns`.
+template <std::size_t n>
+class LaneRows {
+public:
+    using Parts = LaneParts<n>;
+    using Start = SmallState;
+
+    LaneRows(const CallbackSource& source, const Request& request, const FormulaSeries& series,
+             const Source::Rows& rows)
+        : source_(source), request_(request), series_(series), rows_(rows)
+    {
+    }
+
+    [[nodiscard]] std::size_t count() const { return rows_.count; }
+    void open(std::optional<Parts>& parts, std::size_t row) const
+    {
+        parts.emplace(source_, request_, series_, rows_.start(rows_.first + row));
+    }
+    [[nodiscard]] Start start(std::size_t row) const
+    {
+        return small_state(rows_.start(rows_.first + row));
+    }
+    template <class Adapter>
+    [[nodiscard]] static bool shares(const Adapter& /*adapter*/)
+    {
+        return true;
+    }
+    template <class Function>
+    void attempt(std::size_t row, const Function& run) const
+    {
+        try {
+            run();
+        } catch (...) {
+            rows_.fail(rows_.first + row, std::current_exception());
+        }
+    }
+    void keep(std::size_t row, Run<Start>&& run) const
+    {
+        rows_.keep(rows_.first + row, record_of(std::move(run)));
+    }
+
+private:
+    const CallbackSource& source_;
+    const Request& request_;
+    const FormulaSeries& series_;
+    const Source::Rows& rows_;
+};
+
+/// The series of four runs, by code.
+template <std::size_t n, bool has_guard>
+class CodeLanes {
+    using Pack = detail::LanePack<true>;
+
+public:
+    static constexpr std::size_t components = n;
+    static constexpr bool guarded = has_guard;
+
+    explicit CodeLanes(LanesCode code) noexcept : code_(code) {}
+
+    template <class Adapter>
+    void set(std::size_t /*lane*/, const Adapter& /*adapter*/)
+    {
+    }
+    [[gnu::always_inline]] void compute(const Pack& t, const Pack* x,
+                                        const detail::TaylorCoefficients<Pack>& to) const
+    {
+        const auto numbers = [](auto* packs) { return reinterpret_cast<double*>(packs); };
+        code_(reinterpret_cast<const double*>(&t), reinterpret_cast<const double*>(x), to.order,
+              numbers(to.x), numbers(to.guards));
+    }
+
+private:
+    LanesCode code_;
+};
+
+template <std::size_t n, bool has_guard>
+void run_in_lanes(LaneRows<n>& rows, const Options& options, LanesCode code)
+{
+    using Series = CodeLanes<n, has_guard>;
+    detail::TaylorLanes<SmallSystem, SmallState, true, Series> lanes(
+        options, detail::taylor_order(0, options.rtol), Series(code));
+    detail::LaneRuns(lanes, rows, options).run();
+}
+
+}  // namespace
+
+bool CallbackSource::runs_side_by_side(const Request& request, std::size_t n) const
+{
+    const bool fits = small_ && n > 0 && n <= SmallState::room && request.by_series &&
+                      request.is_plain_or_series() && series_ && parameter_count_ == 0;
+    if (!fits || moded_ || guards_.size() > 1 || n != flow_.formula->in(0).components()) {
+        return false;
+    }
+    const detail::LazyTape& tape = series_->tape(0, name_);
+    return !tape.is_polynomial() && series_->lanes(name_) && !detail::fuses_products();
+}
+
+void CallbackSource::run_side_by_side(const Request& request, const Rows& rows) const
+{
+    const auto run = [&]<std::size_t n>(std::integral_constant<std::size_t, n>) {
+        LaneRows<n> of(*this, request, *series_, rows);
+        const LanesCode code = series_->lanes(name_);
+        if (guards_.empty()) {
+            run_in_lanes<n, false>(of, request.options, code);
+        } else {
+            run_in_lanes<n, true>(of, request.options, code);
+        }
+    };
+    switch (flow_.formula->in(0).components()) {
+        case 1: return run(std::integral_constant<std::size_t, 1>());
+        case 2: return run(std::integral_constant<std::size_t, 2>());
+        case 3: return run(std::integral_constant<std::size_t, 3>());
+        default: return run(std::integral_constant<std::size_t, 4>());
     }
 }
 

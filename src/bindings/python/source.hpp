@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
@@ -165,6 +166,22 @@ public:
     {
         return std::nullopt;
     }
+
+    /// Where the results of rows go that are run together.
+    struct Rows {
+        std::size_t first = 0, count = 0;
+        std::function<State(std::size_t)> start;
+        std::function<void(std::size_t, Record&&)> keep;
+        std::function<void(std::size_t, std::exception_ptr)> fail;
+    };
+    /// Whether `run_side_by_side` runs rows of n components, with the bits that they have alone.
+    [[nodiscard]] virtual bool runs_side_by_side(const Request& /*request*/,
+                                                 std::size_t /*n*/) const
+    {
+        return false;
+    }
+    /// Runs rows four at a time.
+    virtual void run_side_by_side(const Request& /*request*/, const Rows& /*rows*/) const {}
 
     /// Whether its runs need no interpreter and hold no function of Python.
     [[nodiscard]] virtual bool is_free() const noexcept { return false; }

@@ -152,29 +152,58 @@ constexpr bool lanes_may_be_wide = lanes_are_wide || RICOCHET_WIDE_SERIES;
 #endif
 }
 
+/// The series of several runs of a system whose operations the compiler knows.
+template <class System, class X, bool wide>
+class UnrolledLanes {
+    using Pack = LanePack<wide>;
+
+public:
+    static constexpr std::size_t components = fixed_size<X>();
+    static constexpr const auto& tape = taylor_tape<System, components, 0>;
+    static constexpr bool guarded = tape.guards == 1;
+
+    /// Takes the constants of the run in a lane.
+    void set(std::size_t lane, const TaylorAdapter<System, X, components>& adapter)
+    {
+        const auto& constants = adapter.constants(0);
+        for (std::size_t i = 0; i < constants.size(); ++i) constants_[i].set(lane, constants[i]);
+    }
+    [[gnu::always_inline]] void compute(const Pack& t, const Pack* x,
+                                        const TaylorCoefficients<Pack>& to) const
+    {
+        TaylorSeries<tape, most_taylor_order, true, Pack>::compute_inline(constants_.data(), t, x,
+                                                                          to);
+    }
+
+private:
+    std::array<Pack, tape.ops_count> constants_;
+};
+
 /// Up to `lane_count` runs of `System` from starts like X.
 /// @tparam wide  in registers of four doubles, which the processor has
-template <class System, class X, bool wide>
+/// @tparam Series  their series, with the members of `UnrolledLanes`
+template <class System, class X, bool wide, class Series = UnrolledLanes<System, X, wide>>
 class TaylorLanes {
     using Pack = LanePack<wide>;
     using Mask = LaneMask<wide>;
-    static constexpr std::size_t n = fixed_size<X>();
+    static constexpr std::size_t n = Series::components;
     using D = TaylorAdapter<System, X, n>;
     using C = CoreState<X>;
     using State = StepState<C>;
     using Y = typename D::Room::Guarded;
     using Guard = GuardView<System, Y>;
-    static constexpr const auto& tape = taylor_tape<System, n, 0>;
-    static constexpr bool guarded = tape.guards == 1;
-    using Series = TaylorSeries<tape, most_taylor_order, true, Pack>;
+    static constexpr bool guarded = Series::guarded;
 
 public:
     using SystemAdapter = D;
 
     /// Sets the options that all runs have in common.
     /// @param order  of their series
-    TaylorLanes(const Options& options, int order)
-        : options_(options), order_(order), backward_(options.t_end < options.t_start)
+    TaylorLanes(const Options& options, int order, const Series& series = {})
+        : options_(options),
+          order_(order),
+          backward_(options.t_end < options.t_start),
+          series_(series)
     {
     }
 
@@ -255,8 +284,7 @@ public:
 private:
     void put(std::size_t lane, D& adapter, const State& state, const QuietRun& quiet)
     {
-        const auto& constants = adapter.constants(0);
-        for (std::size_t i = 0; i < constants.size(); ++i) constants_[i].set(lane, constants[i]);
+        series_.set(lane, adapter);
         for (std::size_t i = 0; i < n; ++i) {
             x0_[i].set(lane, state.x0[i]);
             remainder_[i].set(lane, state.remainder[i]);
@@ -297,8 +325,7 @@ private:
 
     [[gnu::always_inline]] void expand()
     {
-        Series::compute_inline(constants_.data(), start_, x0_.data(),
-                               {order_, coefficients_.data(), guards_.data()});
+        series_.compute(start_, x0_.data(), {order_, coefficients_.data(), guards_.data()});
         if (!backward_) return;
         for (std::size_t k = 1; k <= static_cast<std::size_t>(order_); k += 2) {
             for (std::size_t i = 0; i < n; ++i) {
@@ -371,9 +398,10 @@ private:
     {
         for (std::size_t lane = 0; lane < lane_count; ++lane) {
             if (!fine[lane]) continue;
-            Y x;
-            for (std::size_t i = 0; i < n; ++i) x[own(i, x)] = x1[i][lane];
             const auto& [adapter, state] = runs_[lane];
+            Y x;
+            if constexpr (requires { x.resize(n); }) x.resize(n);
+            for (std::size_t i = 0; i < n; ++i) x[own(i, x)] = x1[i][lane];
             std::uint64_t calls = 0;
             try {
                 const Guard guard(adapter->system(), calls,
@@ -427,7 +455,7 @@ private:
     std::array<bool, lane_count> used_{};
     Mask active_{};
     Mask departs_{};  ///< the guard starts on its surface
-    std::array<Pack, tape.ops_count> constants_;
+    Series series_;
     std::array<Pack, n> x0_, remainder_, rate0_;
     Pack start_, start_remainder_, end_, h_, h_next_, sign_, g0_;
     Pack steps_, most_steps_;  ///< whole numbers
