@@ -452,7 +452,7 @@ Stepped Instance::step(double t, double h)
     ++calls.steps;
     Stepped stepped{.t = t + h};
     if (description().version == 2) {
-        const int status = f_.step2(handle_, t, h, kept_ == nullptr ? 1 : 0);
+        const int status = f_.step2(handle_, t, h, may_return_ ? 0 : 1);
         if (status != status_discard) {
             check(status, "DoStep");
             return stepped;
@@ -468,15 +468,36 @@ Stepped Instance::step(double t, double h)
         return stepped;
     }
     bool early = false;
-    check(f_.step3(handle_, t, h, kept_ == nullptr, &stepped.event, &stepped.terminate, &early,
+    check(f_.step3(handle_, t, h, !may_return_, &stepped.event, &stepped.terminate, &early,
                    &stepped.t),
           "DoStep");
     if (!early && !stepped.terminate) stepped.t = t + h;
     return stepped;
 }
 
+std::shared_ptr<void> Instance::save_state()
+{
+    if (f_.keep_state == nullptr) {
+        throw Error(fmt::format("{}: does not offer to keep its state", description().file));
+    }
+    may_return_ = true;
+    void* state = nullptr;
+    check(f_.keep_state(handle_, &state), "GetFMUState");
+    return {state, [this](void* kept) {
+                if (stage_ != Stage::lost) f_.free_state(handle_, &kept);
+            }};
+}
+
+void Instance::restore_state(void* state)
+{
+    if (stage_ == Stage::lost) throw Error(fmt::format("{}: is lost", description().file));
+    check(f_.set_kept_state(handle_, state), "SetFMUState");
+    stage_ = Stage::initialized;
+}
+
 void Instance::keep_state()
 {
+    may_return_ = true;
     check(f_.keep_state(handle_, &kept_), "GetFMUState");
 }
 

@@ -73,6 +73,9 @@ public:
     /// Keeps the present state, in place of one that was kept before.
     void keep_state();
     void go_back_to_kept_state();
+    /// A state of its own, which must not outlive the instance.
+    [[nodiscard]] std::shared_ptr<void> save_state();
+    void restore_state(void* state);
     void enter_step_mode();
     [[nodiscard]] bool uses_event_mode() const noexcept { return event_mode_; }
 
@@ -113,7 +116,8 @@ private:
     Handle handle_ = nullptr;
     Stage stage_ = Stage::instantiated;
     bool event_mode_ = false;
-    void* kept_ = nullptr;  ///< state
+    void* kept_ = nullptr;     ///< state
+    bool may_return_ = false;  ///< to an earlier state
     std::vector<std::string> messages_;
     std::vector<Reference> derivative_references_;
     std::vector<Element> state_elements_;

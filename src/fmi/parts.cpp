@@ -126,14 +126,14 @@ void Simulation::Parts::record(Row::Place place)
 
 bool Simulation::Parts::sample_is_due(double by, bool or_at) const
 {
-    if (next_sample_ == options.sample_times.size()) return false;
-    const double sample = options.sample_times[next_sample_];
+    if (next_sample == options.sample_times.size()) return false;
+    const double sample = options.sample_times[next_sample];
     return or_at ? sample <= by : sample < by;
 }
 
 void Simulation::Parts::skip_samples(double up_to)
 {
-    while (sample_is_due(up_to, true)) ++next_sample_;
+    while (sample_is_due(up_to, true)) ++next_sample;
 }
 
 }  // namespace ricochet::fmi

@@ -1,6 +1,7 @@
 // A run of an FMU in progress, of either kind.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,8 +13,17 @@
 
 namespace ricochet::fmi {
 
+/// How far a run has come.
+struct Progress {
+    Run run;
+    double t = 0;  ///< [s]
+    bool ended = false;
+    std::vector<double> x;  ///< one component of zero without states
+    std::size_t next_sample = 0;
+};
+
 /// What both kinds of run share: the instance, its inputs, what is recorded.
-struct Simulation::Parts {
+struct Simulation::Parts : Progress {
     Parts(const Fmu& fmu, const Options& options, Kind kind);
     virtual ~Parts() = default;
     Parts(const Parts&) = delete;
@@ -23,6 +33,8 @@ struct Simulation::Parts {
     virtual void advance() = 0;
     /// Sets a variable at the present time, and lets the FMU answer.
     virtual void answer(const Element& element, double value) = 0;
+    /// A function that takes what the kind of run has of its own to what it is now.
+    [[nodiscard]] virtual std::function<void()> keep() = 0;
 
     /// Calls `body`; an error of the FMU ends the run.
     template <class Body>
@@ -39,10 +51,7 @@ struct Simulation::Parts {
     Options options;
     Instance instance;
     Inputs inputs;
-    Run run;
-    double t = 0, t_start = 0, t_end = 1;  ///< [s]
-    bool ended = false;
-    std::vector<double> x;  ///< one component of zero without states
+    double t_start = 0, t_end = 1;  ///< [s]
 
     void end(End how, std::string message = {});
 
@@ -52,8 +61,6 @@ protected:
     /// Whether a sample time lies at or before t, or before it alone.
     [[nodiscard]] bool sample_is_due(double by, bool or_at) const;
     void skip_samples(double up_to);
-
-    std::size_t next_sample_ = 0;
 
 private:
     void resolve_times();
@@ -70,6 +77,7 @@ public:
 
     void advance() override;
     void answer(const Element& element, double value) override;
+    [[nodiscard]] std::function<void()> keep() override;
 
 private:
     void read_states();
@@ -112,6 +120,7 @@ public:
 
     void advance() override;
     void answer(const Element& element, double value) override;
+    [[nodiscard]] std::function<void()> keep() override;
 
 private:
     template <class Set>

@@ -151,7 +151,7 @@ ricochet::Options Phases::options_of_phase(double until) const
     o.stop_at_event = true;
     o.cancelled = options.cancelled;
     const auto& samples = options.sample_times;
-    const auto first = samples.begin() + static_cast<std::ptrdiff_t>(next_sample_);
+    const auto first = samples.begin() + static_cast<std::ptrdiff_t>(next_sample);
     o.sample_times.assign(first, std::lower_bound(first, samples.end(), until));
     return o;
 }
@@ -172,7 +172,7 @@ void Phases::take_samples(const Trajectory<std::vector<double>>& samples, std::s
                           double end)
 {
     for (; taken < samples.t.size() && samples.t[taken] < end; ++taken) {
-        ++next_sample_;
+        ++next_sample;
         t = samples.t[taken];
         if (phase_.at(t, samples.x[taken])) record(Row::Place::sample);
     }
@@ -318,6 +318,19 @@ void Phases::advance()
         skip_samples(t);
     }
     if (!ended && t >= t_end) end(End::reached_end);
+}
+
+std::function<void()> Phases::keep()
+{
+    return [this, phase = phase_, info = info_, reviews = reviews_, progress = progress_,
+            events = events_without_progress_] {
+        phase_ = phase;
+        phase_.start(t, t_end);
+        info_ = info;
+        reviews_ = reviews;
+        progress_ = progress;
+        events_without_progress_ = events;
+    };
 }
 
 void Phases::answer(const Element& element, double value)

@@ -144,6 +144,32 @@ double Simulation::get(std::string_view name)
     return parts_->instance.get(*element);
 }
 
+struct SavedRun::Kept {
+    std::shared_ptr<Simulation::Parts> parts;  // first: its instance frees the state
+    Progress progress;
+    std::function<void()> own;
+    std::shared_ptr<void> state;
+};
+
+SavedRun Simulation::save()
+{
+    SavedRun saved;
+    saved.kept_ = std::make_shared<SavedRun::Kept>(
+        SavedRun::Kept{parts_, *parts_, parts_->keep(), parts_->instance.save_state()});
+    return saved;
+}
+
+void Simulation::restore(const SavedRun& saved)
+{
+    const std::string& file = parts_->instance.description().file;
+    if (!saved.kept_ || saved.kept_->parts != parts_) {
+        throw Error(fmt::format("{}: found a saved run of another simulation", file));
+    }
+    parts_->instance.restore_state(saved.kept_->state.get());
+    static_cast<Progress&>(*parts_) = saved.kept_->progress;
+    saved.kept_->own();
+}
+
 Run Simulation::finish()
 {
     while (advance()) {

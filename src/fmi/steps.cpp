@@ -65,8 +65,8 @@ void Steps::advance()
     double to = std::min(t_start + static_cast<double>(count_ + 1) * step_, t_end);
     if (instance.interface().variable_steps) {
         to = std::min({to, inputs.next_break(t), next_time_});
-        if (next_sample_ < options.sample_times.size()) {
-            to = std::min(to, options.sample_times[next_sample_]);
+        if (next_sample < options.sample_times.size()) {
+            to = std::min(to, options.sample_times[next_sample]);
         }
     } else if (to - t < step_ * (1 - 1e-9)) {
         return end(End::reached_end);  // it takes whole steps only
@@ -191,6 +191,15 @@ void Steps::locate_passages(double asked, double reached)
     t = start;
     instance.go_back_to_kept_state();
     (void)instance.step(start, asked);
+}
+
+std::function<void()> Steps::keep()
+{
+    return [this, watches = watches_, count = count_, next_time = next_time_] {
+        watches_ = watches;
+        count_ = count;
+        next_time_ = next_time;
+    };
 }
 
 void Steps::answer(const Element& element, double value)

@@ -8,8 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "ricochet/faults/fault_system.hpp"
 #include "ricochet/fmi/run.hpp"
 #include "ricochet/integrate.hpp"
+#include "ricochet/rosenbrock.hpp"
 #include "ricochet/systems/bouncing_ball.hpp"
 #include "ricochet/systems/coulomb_oscillator.hpp"
 #include "ricochet/systems/impact_oscillator.hpp"
@@ -358,6 +360,101 @@ TEST_P(Exports, ParametersAreTunedDuringARun)
     ASSERT_TRUE(simulation.advance());
     EXPECT_NEAR(simulation.t(), t + speed / 9.81, 1e-14);
     EXPECT_THROW(simulation.set("height", 1), Error);
+}
+
+TEST_P(Exports, AFaultHasTheSlipOfARunOfItsOwn)
+{
+    const RateStateFaultSystem system(
+        StrikeSlipFault({.elements = 2}),
+        {.plate_velocity = 1e-3, .slip_rate = 2e-3, .overload = 1e-3});
+    const auto own =
+        ricochet::integrate(system, system.start(), {.t_end = 30, .rtol = 1e-9, .atol = 1e-9},
+                            ErrorControlled<Rosenbrock4>{});
+    ASSERT_EQ(own.outcome, Outcome::reached_end);
+    const Eigen::VectorXd expected = system.slip(own.t, own.x);
+    const std::vector<std::string> slips{"slip[1]", "slip[2]", "slip[3]", "slip[4]"};
+    // A step ends at each communication point, which is within the tolerance of the slip; with one
+    // communication step the run is the same.
+    for (const auto& [step, tolerance] : {std::pair{0.7, 1e-8}, {30.0, 1e-14}}) {
+        const Result run = fmi::run(exported("fault", GetParam()), {.t_end = 30,
+                                                                    .output = slips,
+                                                                    .sample_times = {30},
+                                                                    .step = step,
+                                                                    .co_simulation = true});
+        ASSERT_EQ(run.end, End::reached_end) << describe(run);
+        for (Eigen::Index i = 0; i < 4; ++i) {
+            const double found = run.rows.back().values[static_cast<std::size_t>(i)];
+            EXPECT_NEAR(found, expected[i], tolerance) << step;
+            EXPECT_GT(found, 0.02);  // 1 mm/s for 30 s
+        }
+    }
+}
+
+TEST_P(Exports, ASavedRunGoesOnWithTheSameBitsAnyNumberOfTimes)
+{
+    for (const bool co : {false, true}) {
+        const Options options{.t_end = 12,
+                              .output = {"height", "velocity"},
+                              .sample_times = {1, 5, 11},
+                              .step = 0.5,
+                              .co_simulation = co};
+        Simulation simulation(exported("ball", GetParam()), options);
+        for (int i = 0; i < 3; ++i) ASSERT_TRUE(simulation.advance());
+        const double t = simulation.t();
+        const SavedRun saved = simulation.save();
+        const Result first = simulation.finish();
+        ASSERT_EQ(first.end, End::reached_end) << describe(first);
+        simulation.restore(saved);
+        EXPECT_EQ(simulation.t(), t);
+        EXPECT_FALSE(simulation.ended());
+        simulation.set("gravity", 1);  // another future
+        EXPECT_NE(simulation.finish().rows.back().values, first.rows.back().values);
+        simulation.restore(saved);
+        const Result again = simulation.finish();
+        ASSERT_EQ(again.rows.size(), first.rows.size());
+        for (std::size_t i = 0; i < again.rows.size(); ++i) {
+            EXPECT_EQ(again.rows[i].t, first.rows[i].t);
+            EXPECT_EQ(again.rows[i].values, first.rows[i].values) << i;
+        }
+        ASSERT_EQ(again.events.size(), first.events.size());
+        for (std::size_t i = 0; i < again.events.size(); ++i) {
+            EXPECT_EQ(again.events[i].t, first.events[i].t);
+        }
+        // The same as a run that was never saved.
+        EXPECT_EQ(fmi::run(exported("ball", GetParam()), options).rows.back().values,
+                  first.rows.back().values);
+    }
+}
+
+TEST_P(Exports, ASavedRunOfASetValuedSystemGoesOnWhileItIsHeld)
+{
+    Simulation simulation(exported("held_ball", GetParam()),
+                          {.t_end = 2, .output = {"height"}, .sample_times = {2}, .step = 0.05});
+    while (simulation.t() < 1.2) ASSERT_TRUE(simulation.advance());
+    EXPECT_EQ(simulation.get("height"), 0);  // it lies on the floor
+    const SavedRun saved = simulation.save();
+    const double first = simulation.finish().last("height");
+    EXPECT_GT(first, 0.1);
+    simulation.restore(saved);
+    EXPECT_EQ(simulation.get("height"), 0);
+    EXPECT_EQ(simulation.finish().last("height"), first);
+}
+
+TEST_P(Exports, ASavedRunIsOfOneSimulationAndMayOutliveIt)
+{
+    SavedRun saved;
+    Simulation other(exported("ball", GetParam()), {.t_end = 12});
+    EXPECT_THROW(other.restore(saved), Error);
+    {
+        Simulation simulation(exported("ball", GetParam()), {.t_end = 12});
+        saved = simulation.save();
+    }
+    try {
+        other.restore(saved);
+        FAIL() << "not refused";
+    } catch (const Error& error) {
+        EXPECT_NE(std::string(error.what()).find("another simulation"), std::string::npos);
+    }
 }
 
 TEST(ExportedDescription, SaysNamesUnitsAndStarts)

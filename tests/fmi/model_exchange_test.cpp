@@ -342,6 +342,7 @@ TEST_P(ModelExchange, ASimulationIsDrivenFromEventToEvent)
     EXPECT_NEAR(simulation.t(), std::sqrt(2 / 9.81) * (1 + 0.7), 1e-15);
     EXPECT_THROW(simulation.set("x[1]", 1), Error);
     EXPECT_EQ(simulation.get("violations"), 0);
+    EXPECT_THROW((void)simulation.save(), Error);  // which it does not offer
     EXPECT_EQ(simulation.finish().end, End::reached_end);
 }
 

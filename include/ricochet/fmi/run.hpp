@@ -164,6 +164,16 @@ struct Run {
 /// One sentence on how the run has ended.
 [[nodiscard]] std::string describe(const Run& run);
 
+class Simulation;
+
+/// A run at one time, with everything that its future depends on, and what it has recorded.
+class SavedRun {
+private:
+    friend class Simulation;
+    struct Kept;
+    std::shared_ptr<const Kept> kept_;
+};
+
 /// A run that the caller drives from event to event.
 class Simulation {
 public:
@@ -190,13 +200,20 @@ public:
     /// The present value of a variable. @throws Error if it is unknown or no number.
     [[nodiscard]] double get(std::string_view name);
 
+    /// Keeps the run as it is now, by the FMU's own copy of its state.
+    /// @throws Error if the FMU does not offer that (`Interface::saves_state`), or it fails
+    [[nodiscard]] SavedRun save();
+    /// Goes on from a saved run of this simulation, any number of times; also where it has ended.
+    /// @throws Error if it is of another simulation, or the FMU fails or has crashed
+    void restore(const SavedRun& saved);
+
     /// Advances to the end and returns the result.
     [[nodiscard]] Run finish();
 
     struct Parts;
 
 private:
-    std::unique_ptr<Parts> parts_;
+    std::shared_ptr<Parts> parts_;  ///< shared with what is saved
 };
 
 /// Runs an FMU.
