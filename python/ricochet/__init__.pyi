@@ -577,6 +577,9 @@ class Fmu:
                  step: Optional[float] = None,
                  co_simulation: Optional[bool] = None,
                  watch: Optional[Mapping[str, Any]] = None) -> FmuRun: ...
+    def ensemble(self, table: Mapping[str, ArrayLike], t_end: Optional[float] = None,
+                 t_start: Optional[float] = None, *, threads: Optional[int] = None,
+                 **options: Any) -> list[FmuRun]: ...
 
 def load_fmu(file: Union[str, PathLike[str]]) -> Fmu: ...
 

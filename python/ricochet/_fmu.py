@@ -60,6 +60,7 @@ class Fmu:
         self.name, self.version, self.states = told["name"], told["version"], told["states"]
         self.variables = {name: SimpleNamespace(**of) for name, of in told["variables"].items()}
         self.parameters = _Parameters(self.variables)
+        self._once_per_process = told["once_per_process"]
         self._t_start = 0.0 if told["t_start"] is None else told["t_start"]
         self._t_end = max(self._t_start + 1 if told["t_end"] is None else told["t_end"], self._t_start)
 
@@ -121,6 +122,63 @@ class Fmu:
                  "sample_times": np.asarray(sample_times, dtype=float).tolist(),
                  "tables": tables, "functions": functions}
         return FmuRun(self._fmu.run(given), [name for name, *_ in watched])
+
+    def ensemble(self, table, t_end=None, t_start=None, *, threads=None, **options):
+        """Run the model once for each row of a table of values.
+
+        Parameters
+        ----------
+        table
+            Dictionary from names of parameters or start values to sequences of one length.
+        t_end, t_start, options
+            As of `simulate`, for all runs.
+        threads : int
+            Runs at a time, each an instance of its own; default: one a processor. An FMU that may
+            be instantiated once a process only is run in processes of its own, which a script
+            must be able to import (``if __name__ == "__main__":``).
+
+        Returns
+        -------
+        list of FmuRun
+            In the order of the rows; the runs of `simulate`, bit for bit.
+
+        Raises
+        ------
+        ValueError
+            As `simulate`, and where the columns have different lengths.
+        """
+        columns = {name: np.asarray(values, dtype=float).ravel().tolist()
+                   for name, values in table.items()}
+        lengths = {len(values) for values in columns.values()}
+        if len(lengths) != 1:
+            raise ValueError("table: found columns of " + (" and ".join(map(str, sorted(lengths))) or "no")
+                             + " rows, expected at least one column, and all of one length")
+        if threads is None:
+            threads = os.cpu_count() or 1
+        if isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+            raise ValueError(f"threads: found {threads!r}, expected a whole number from 1 on")
+        common = {**self.parameters, **(options.pop("start", None) or {})}
+        jobs = [(t_end, t_start, {**options, "start": {**common, **dict(zip(columns, row))}})
+                for row in zip(*columns.values())]
+        if self._once_per_process:
+            from multiprocessing import get_context
+
+            with get_context("spawn").Pool(min(threads, len(jobs)) or 1, maxtasksperchild=1) as pool:
+                return pool.starmap(_run_file, [(self.file, *job) for job in jobs], chunksize=1)
+        from concurrent.futures import ThreadPoolExecutor
+
+        with ThreadPoolExecutor(threads) as pool:
+            runs = [pool.submit(self.simulate, job[0], job[1], **job[2]) for job in jobs]
+            try:
+                return [run.result() for run in runs]
+            except BaseException:
+                for run in runs:
+                    run.cancel()
+                raise
+
+
+def _run_file(file, t_end, t_start, options):
+    return Fmu(file).simulate(t_end, t_start, **options)
 
 
 def _tables_and_functions(inputs):

@@ -2,6 +2,7 @@
 
 import math
 import os
+import zipfile
 
 import numpy as np
 import pytest
@@ -70,6 +71,50 @@ def test_a_watched_level_is_located_in_co_simulation():
     np.testing.assert_allclose([event.t for event in passed], [t for t in expected if t < 3], rtol=0, atol=2e-15)
     with pytest.raises(ValueError, match="'depth'"):
         ball.simulate(watch={"depth": 2})
+
+
+def test_an_ensemble_has_the_runs_of_its_rows():
+    ball = ricochet.load_fmu(f"{FMUS}/fmu_ball.fmu")
+    ball.parameters["gravity"] = 5
+    rows = {"restitution": [0.5, 0.7, 0.9, 0.6], "height": np.arange(1, 5)}
+    runs = ball.ensemble(rows, 3, threads=2, output=["height", "velocity"], samples=5)
+    assert len(runs) == 4
+    for i, run in enumerate(runs):
+        alone = ball.simulate(3, start={name: values[i] for name, values in rows.items()}, output=["height", "velocity"], samples=5)
+        assert run.success and np.array_equal(run["height"], alone["height"])
+        assert [event.t for event in run.events] == [event.t for event in alone.events]
+        # Gravity is that of `parameters`, the height that of the row.
+        assert run.events[0].t == pytest.approx(math.sqrt(2 * (i + 1) / 5), abs=1e-15)
+    assert ball.ensemble({"height": []}, 1) == []
+
+
+def test_an_ensemble_of_an_fmu_for_one_instance_a_process_takes_processes(tmp_path):
+    file = tmp_path / "once.fmu"
+    with zipfile.ZipFile(f"{FMUS}/fmu_ball.fmu") as whole, zipfile.ZipFile(file, "w") as changed:
+        for name in whole.namelist():
+            content = whole.read(name)
+            if name == "modelDescription.xml":
+                content = content.replace(b"modelIdentifier=", b'canBeInstantiatedOnlyOncePerProcess="true" modelIdentifier=')
+            changed.writestr(name, content)
+    ball = ricochet.load_fmu(file)
+    rows = {"restitution": [0.5, 0.7, 0.9]}
+    runs = ball.ensemble(rows, 3, threads=2, output=["height"], samples=3)
+    usual = ricochet.load_fmu(f"{FMUS}/fmu_ball.fmu").ensemble(rows, 3, output=["height"], samples=3)
+    for run, expected in zip(runs, usual):
+        assert np.array_equal(run["height"], expected["height"]) and len(run.events) == len(expected.events)
+
+
+def test_a_table_that_does_not_fit_is_named():
+    ball = ricochet.load_fmu(f"{FMUS}/fmu_ball.fmu")
+    with pytest.raises(ValueError, match="2 and 3 rows"):
+        ball.ensemble({"height": [1, 2], "gravity": [1, 2, 3]})
+    with pytest.raises(ValueError, match="no rows"):
+        ball.ensemble({})
+    with pytest.raises(ValueError, match="no variable 'mass'"):
+        ball.ensemble({"mass": [1, 2]})
+    for threads in (0, 1.5, True):
+        with pytest.raises(ValueError, match="threads: found"):
+            ball.ensemble({"height": [1]}, threads=threads)
 
 
 def test_what_does_not_fit_is_named(tmp_path):

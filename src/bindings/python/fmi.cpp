@@ -47,6 +47,8 @@ py::dict describe(const Fmu& fmu)
     out["indicators"] = d.indicator_count;
     out["model_exchange"] = d.model_exchange.has_value();
     out["co_simulation"] = d.co_simulation.has_value();
+    out["once_per_process"] = (d.model_exchange && d.model_exchange->once_per_process) ||
+                              (d.co_simulation && d.co_simulation->once_per_process);
     out["t_start"] = d.t_start;
     out["t_end"] = d.t_end;
     return out;
