@@ -297,6 +297,9 @@ class Scene:
     def point(self, at: ArrayLike, *, mass: float = 1.0, velocity: ArrayLike = (0.0, 0.0),
               drag: float = 0.0, material: Optional[str] = None,
               name: Optional[str] = None) -> int: ...
+    def plate(self, start: ArrayLike, end: ArrayLike, *, along: Optional[ArrayLike] = None,
+              speed: float = 0.0, mass: float = 1.0, material: Optional[str] = None,
+              name: Optional[str] = None) -> int: ...
     def wall(self, point: ArrayLike, normal: ArrayLike, *, material: Optional[str] = None,
              motion: Optional[Mapping[str, Any]] = None, temperature: float = 0.0,
              name: Optional[str] = None) -> int: ...

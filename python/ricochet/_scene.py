@@ -133,7 +133,7 @@ class SceneRun:
 
 
 class Scene:
-    """Discs and points in a plane, with walls, terrain and springs; each body has its own clock.
+    """Discs, points and plates in a plane, with walls, terrain and springs; each body has its own clock.
 
     The plane is vertical with gravity, horizontal without. Discs turn if they have an inertia; at
     others friction acts at the centre. Lengths are in m, times in s, masses in kg.
@@ -218,6 +218,20 @@ class Scene:
         """Adds a body without extension, and returns its number; two points never meet."""
         return self._scene.point(_text(name), _pair(at, "at"), _pair(velocity, "velocity"),
                                  number_from(mass, "mass"), number_from(drag, "drag"),
+                                 self._material(material))
+
+    def plate(self, start, end, *, along=None, speed=0.0, mass=1.0, material=None, name=None):
+        """Adds a straight plate from ``start`` to ``end``, such as a piston, and returns its number.
+
+        It moves along a line without turning: in the direction ``along`` (x, y) of any length, by
+        default at a right angle to itself, with this ``speed`` [m/s]. Discs, points and parallel plates
+        meet it from both sides, and walls stop it.
+        """
+        direction = [0.0, 0.0] if along is None else _pair(along, "along")
+        if along is not None and not any(direction):
+            raise ValueError(f"along: found {along!r}, expected a direction")
+        return self._scene.plate(_text(name), [_pair(start, "start"), _pair(end, "end")], direction,
+                                 number_from(speed, "speed"), number_from(mass, "mass"),
                                  self._material(material))
 
     def wall(self, point, normal, *, material=None, motion=None, temperature=0.0, name=None):

@@ -13,6 +13,9 @@
 
 namespace ricochet::detail {
 
+/// Gaps, relative to the coordinates, that the steps of groups in contact leave.
+inline constexpr double loose = 1e-10;
+
 /// Groups in lasting contact. In a step of its group a body moves on the straight line of its
 /// record; its velocity changes along it (`World::drifts`).
 class Contacts {

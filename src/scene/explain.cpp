@@ -44,6 +44,7 @@ std::string first_meeting(const World& world, std::span<const std::uint32_t> gro
             const Body& one = world.bodies[group[x]];
             const Body& two = world.bodies[group[y]];
             if (one.island != none || two.island != none) continue;
+            if (world.plate(group[x]) || world.plate(group[y])) continue;
             const Meeting meeting = meet(world, group[y], group[x]);
             const Instant t = meeting.from.after(meeting.after);
             if (meeting.after < never && before(t, first)) {
@@ -135,6 +136,11 @@ std::string explain(const Scene& scene, const SceneOptions& options)
                    plural(scene.springs().size(), "spring"),
                    plural(world.islands->count(), "island"),
                    plural(world.fixed_count - world.wall_count, "piece"));
+    if (!world.plates.empty()) {
+        fmt::format_to(to, "  {} of the bodies; every other body is tested against {}\n",
+                       plural(world.plates.size(), "plate"),
+                       world.plates.size() == 1 ? "it" : "each");
+    }
     describe_islands(world, out);
     if (!world.motions.empty()) {
         const bool one = world.motions.size() == 1;

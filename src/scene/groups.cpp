@@ -240,7 +240,8 @@ Groups groups_of(const World& world)
     groups.order_.resize(world.bodies.size());
     std::iota(groups.order_.begin(), groups.order_.end(), 0U);
     const bool terrain = world.faces.size() > world.wall_count;
-    const bool driven = world.periodic || world.any_thermal || !world.turns.empty();
+    const bool driven =
+        world.periodic || world.any_thermal || !world.turns.empty() || !world.plates.empty();
     if (terrain || driven || !world.scene.systems().empty() || world.options.observe) {
         // Terrain lies in the squares of a group, moving surfaces, thermal ones and systems may
         // drive bodies anywhere, and images are everywhere: all bodies are one group. An observer

@@ -39,7 +39,7 @@ struct Contact {
     return contact.moving ? v[contact.slot_a] - contact.surface_velocity : v[contact.slot_a];
 }
 
-/// Effect of a push of one body of a system on another one, or on itself.
+/// Effect of a push of one body of a system on another one, or on itself; of a plate on itself.
 struct Coupling {
     std::uint32_t of = 0, by = 0;      ///< slots
     std::array<Vector2, 2> changes{};  ///< [1/kg] of the velocity, by impulses along x and y
@@ -63,7 +63,7 @@ struct Cluster {
     std::vector<Vector2> after;
     std::vector<Contact> contacts;
     std::vector<std::vector<Side>> sides;  ///< of bodies that are points
-    std::vector<Coupling> couplings;       ///< where there are systems
+    std::vector<Coupling> couplings;       ///< of systems and plates
     std::vector<Vector2> impulses;         ///< the same, on each body
     double fastest = 0;                    ///< [m/s] the largest speed before
     std::vector<TurningBody> turning;      ///< of bodies, where a disc turns
@@ -103,7 +103,8 @@ private:
     static void set_masses_of_edges(Cluster& cluster);
     [[nodiscard]] static double slip(const Cluster& cluster, const Contact& contact);
     static void turn(Cluster& cluster, const Contact& contact, double tangential);
-    void strike(Cluster& cluster, Contact& contact) const;
+    void strike(Cluster& cluster, Contact& contact);
+    void undo_gain(Cluster& cluster, Contact& contact, double u);
     void strike_thermal(Cluster& cluster, Contact& contact) const;
     [[nodiscard]] bool apply_laws(Cluster& cluster);
     void solve(Cluster& cluster) const;
@@ -122,6 +123,7 @@ private:
     std::vector<std::uint32_t> struck_;  ///< contacts of the current wave
     std::vector<Vector2> before_wave_;
     std::vector<Vector2> impulses_before_;
+    double gained_ = 0;  ///< [J] by rounding in impacts of plates, to be undone
 };
 
 }  // namespace ricochet::detail

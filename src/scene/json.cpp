@@ -169,7 +169,7 @@ public:
     {
         const Part top(whole, {}, "a scene");
         top.only({"gravity", "period", "memory_limit", "materials", "pairs", "bodies", "walls",
-                  "terrain", "arcs", "springs", "run"});
+                  "terrain", "arcs", "plates", "springs", "run"});
         Scene::Settings settings;
         top.vector("gravity", settings.gravity);
         top.vector("period", settings.period);
@@ -193,11 +193,16 @@ public:
             body({value, path, "a body"}, file.scene);
             ends.push_back(file.scene.bodies().size());
         });
+        const std::size_t bodies = file.scene.bodies().size();
+        top.each("plates", [&](const json& value, const JsonPath& path) {
+            plate({value, path, "a plate"}, file.scene);
+        });
         try {
             double t_start = 0;
             if (top.has("run")) top.part("run", "\"run\"").number("t_start", t_start);
             file.scene.check(t_start);
         } catch (const Misplaced& error) {
+            if (error.body >= bodies) throw Trouble{{"plates", error.body - bodies}, error.what()};
             const auto entry = std::ranges::upper_bound(ends, std::size_t{error.body});
             const auto index = static_cast<std::size_t>(entry - ends.begin());
             throw Trouble{{"bodies", index}, error.what()};
@@ -408,6 +413,18 @@ private:
         if (part.has("grid")) return grid(part, disc, point, scene);
         if (part.has("spacing")) part.fail_at("spacing", R"(expected "grid" with "spacing")");
         part.ask([&] { add(scene, disc, point); });
+    }
+
+    void plate(const Part& part, Scene& scene) const
+    {
+        part.only({"name", "from", "to", "along", "speed", "mass", "material"});
+        Plate plate{.ends = {part.vector("from"), part.vector("to")}};
+        part.text("name", plate.name);
+        part.vector("along", plate.along);
+        part.number("speed", plate.speed);
+        part.number("mass", plate.mass);
+        plate.material = material_of(part);
+        part.ask([&] { return scene.plate(plate); });
     }
 
     /// A number, or the inertia of a solid disc or of a ring.

@@ -53,6 +53,7 @@ SceneMeasure::SceneMeasure(const Scene& scene, const MeasureOptions& options)
     t_ = -std::numeric_limits<double>::infinity();
     for (const Disc& body : scene.bodies()) {
         velocities_.push_back(body.velocity);
+        if (scene.plate_of(static_cast<std::uint32_t>(velocities_.size() - 1))) continue;
         momentum_ = momentum_ + body.mass * body.velocity;
         mass_ += body.mass;
         twice_energy_ += body.mass * dot(body.velocity, body.velocity);
@@ -94,6 +95,7 @@ void SceneMeasure::advance(double t)
 
 void SceneMeasure::change(std::uint32_t body, const Vector2& velocity)
 {
+    if (scene_->plate_of(body)) return;
     const double mass = scene_->bodies()[body].mass;
     Vector2& old = velocities_[body];
     momentum_ = momentum_ + mass * (velocity - old);
@@ -114,6 +116,13 @@ void SceneMeasure::add(const SceneEvent& event)
     const auto number = static_cast<std::size_t>(since / length_);
     Block& block = blocks_[std::min(number, blocks_.size() - 1)];
     const double push = dot(event.impulse, event.normal);
+    const bool first = scene_->plate_of(event.body) != nullptr;
+    const bool second = !event.other.is_surface && scene_->plate_of(event.other.index);
+    if (first && (event.other.is_surface || second)) return;  // of no body of the gas
+    if (first || second) {
+        block.wall_hits += 1;
+        return;
+    }
     if (event.other.is_surface) {
         block.wall_hits += 1;
         block.push[event.other.index] += push;
@@ -133,7 +142,7 @@ SceneMeasures SceneMeasure::result() const
 {
     SceneMeasure whole = *this;  // with the time after the last event
     whole.advance(std::max(t_, options_.t_end));
-    const auto count = static_cast<double>(velocities_.size());
+    const auto count = static_cast<double>(velocities_.size() - scene_->plates().size());
     const auto each = [&](const auto& of) {
         std::vector<double> values;
         for (const Block& block : whole.blocks_) values.push_back(of(block));
@@ -216,6 +225,7 @@ TemperatureProfile temperature_profile(const Scene& scene, const SceneRun& run, 
         std::vector<Slice> sums(slices);
         for (std::size_t i = 0; i < states.size(); ++i) {
             const double place = states[i].at[axis];
+            if (scene.plate_of(static_cast<std::uint32_t>(i))) continue;
             if (!(place >= low && place < high)) continue;
             const auto k = static_cast<std::size_t>((place - low) / width);
             Slice& slice = sums[std::min(k, slices - 1)];

@@ -79,16 +79,6 @@ struct Departure {
     return gap <= rounding ? Departure{std::max(gap, -rounding), rounding} : Departure{};
 }
 
-[[nodiscard]] Path difference(const Path& a, const Path& b) noexcept
-{
-    Path out;
-    out.degree = std::max(a.degree, b.degree);
-    out.until = std::min(a.until, b.until);
-    for (std::size_t k = 0; k < out.c.size(); ++k) out.c[k] = a.c[k] - b.c[k];
-    while (out.degree > 0 && is_zero(out.c[static_cast<std::size_t>(out.degree)])) --out.degree;
-    return out;
-}
-
 }  // namespace
 
 Path World::path(std::uint32_t i, const Instant& t) const

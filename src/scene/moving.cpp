@@ -53,29 +53,6 @@ void check_bounds(const World& world, const MovingFace& of, std::uint32_t surfac
                                 world.scene.name_of(SurfaceId{surface}), what, now.t)};
 }
 
-[[nodiscard]] Vector2 along_path(const Path& path, double s) noexcept
-{
-    Vector2 sum = path.c[4];
-    for (std::size_t k = 4; k-- > 0;) sum = s * sum + path.c[k];
-    return sum;
-}
-[[nodiscard]] Vector2 rate_of_path(const Path& path, double s) noexcept
-{
-    Vector2 sum = 4 * path.c[4];
-    for (std::size_t k = 4; k-- > 1;) sum = s * sum + static_cast<double>(k) * path.c[k];
-    return sum;
-}
-
-/// Bound of the second derivative along a path [m/s^2].
-[[nodiscard]] double acceleration_of(const Path& path) noexcept
-{
-    double sum = 2 * norm(path.c[2]);
-    if (path.degree > 2) {
-        sum += path.until * (6 * norm(path.c[3]) + 12 * path.until * norm(path.c[4]));
-    }
-    return sum;
-}
-
 }  // namespace
 
 FaceGap displaced_gap(const Face& face, const Vector2& moved, double radius, const Vector2& p)
@@ -99,6 +76,7 @@ public:
           moving_(world.moving(face)),
           face_(world.faces[face]),
           body_(world.bodies[i]),
+          radius_(world.reach_to(i, face_)),
           path_(world.path(i, body_.t))
     {
         // Lower bound of the second derivative of the gap to a surface at rest: the distance from a
@@ -115,11 +93,11 @@ public:
         last_ = now;
         p_ = along_path(path_, s);
         v_ = rate_of_path(path_, s);
-        at_ = displaced_gap(face_, now.moved, body_.radius, p_);
+        at_ = displaced_gap(face_, now.moved, radius_, p_);
         return {.gap = at_.gap,
                 .rate = dot(v_ - now.v, at_.normal),
                 .noise = noise(v_, now.v),
-                .closed = World::rounding(p_, body_.radius) + World::rounding(face_.at, 0) +
+                .closed = World::rounding(p_, radius_) + World::rounding(face_.at, 0) +
                           World::rounding(now.moved, 0)};
     }
 
@@ -132,7 +110,7 @@ public:
             ahead = std::max(ahead, falls_after(now.gap, rate, bend_, 0));
         }
         if (bounds.reach < never) {
-            const FaceGap mean = displaced_gap(face_, {}, body_.radius, p_);
+            const FaceGap mean = displaced_gap(face_, {}, radius_, p_);
             const double beyond = mean.gap - bounds.reach;
             const double rate = dot(v_, mean.normal);
             if (beyond > 0) ahead = std::max(ahead, falls_after(beyond, rate, bend_, 0));
@@ -159,6 +137,7 @@ private:
     const MovingFace& moving_;
     const Face& face_;
     const Body& body_;
+    double radius_;
     Path path_;
     double bend_ = 0;
     Evaluated last_{never};
@@ -278,7 +257,8 @@ Meeting meet_moving(const World& world, std::uint32_t i, std::uint32_t which, co
     if (!closing.opened) return {.from = body.t, .after = 0, .presses = true};
     meeting.after = on_map(closing.after, until, [&](double s) {
         const Instant t = body.t.after(s);
-        const FaceGap at = world.moving_gap(which, body.radius, world.position(i, t), t);
+        const double radius = world.reach_to(i, world.faces[which]);
+        const FaceGap at = world.moving_gap(which, radius, world.position(i, t), t);
         return GapAndRate{at.gap,
                           dot(world.heading(i, t) - world.surface_velocity(which, t), at.normal)};
     });

@@ -47,7 +47,8 @@ template <class Pair>
     for (;;) {
         const OpenGap now = pair.look(s);
         if (!std::isfinite(now.gap + now.rate)) return {};
-        opened = opened || now.gap > 4 * now.closed;
+        // One that closes from the start is struck, however small it is.
+        opened = opened || now.gap > 4 * now.closed || (s == 0 && now.rate < -now.noise);
         const bool closed = now.gap <= now.closed;
         const double ahead = closed ? pair.linger(now) : pair.safe(now);
         // Until it may be closed again, a gap that opens at this rate has opened by a quarter of
@@ -95,6 +96,41 @@ template <class Gap, class Bend = UnknownBend>
         if (left <= 0.25 * epsilon * after) break;
     }
     return after;
+}
+
+/// Position along a path after s seconds, and its first derivative.
+[[nodiscard]] inline Vector2 along_path(const Path& path, double s) noexcept
+{
+    Vector2 sum = path.c[4];
+    for (std::size_t k = 4; k-- > 0;) sum = s * sum + path.c[k];
+    return sum;
+}
+[[nodiscard]] inline Vector2 rate_of_path(const Path& path, double s) noexcept
+{
+    Vector2 sum = 4 * path.c[4];
+    for (std::size_t k = 4; k-- > 1;) sum = s * sum + static_cast<double>(k) * path.c[k];
+    return sum;
+}
+
+/// Bound of the second derivative along a path [m/s^2].
+[[nodiscard]] inline double acceleration_of(const Path& path) noexcept
+{
+    double sum = 2 * norm(path.c[2]);
+    if (path.degree > 2) {
+        sum += path.until * (6 * norm(path.c[3]) + 12 * path.until * norm(path.c[4]));
+    }
+    return sum;
+}
+
+/// The path of one body relative to another one.
+[[nodiscard]] inline Path difference(const Path& a, const Path& b) noexcept
+{
+    Path out;
+    out.degree = std::max(a.degree, b.degree);
+    out.until = std::min(a.until, b.until);
+    for (std::size_t k = 0; k < out.c.size(); ++k) out.c[k] = a.c[k] - b.c[k];
+    while (out.degree > 0 && is_zero(out.c[static_cast<std::size_t>(out.degree)])) --out.degree;
+    return out;
 }
 
 /// Gap between a body at p and a face that is displaced by `moved`.

@@ -302,6 +302,16 @@ void Scene::set_start(BodyId body, const Vector2& at, const Vector2& velocity)
 {
     const std::string label = require_movable(body);
     Disc moved = bodies_[body.index];
+    if (const PlateShape* const plate = plate_of(body.index)) {
+        const Vector2 way{at[0] - moved.at[0], at[1] - moved.at[1]};
+        const auto across = [&](const Vector2& v) {
+            return std::fabs(plate->along[0] * v[1] - plate->along[1] * v[0]);
+        };
+        const double size = std::hypot(at[0], at[1]) + std::hypot(moved.at[0], moved.at[1]);
+        if (across(way) > 1e-12 * size || across(velocity) > 1e-12 * std::hypot(velocity[0], velocity[1])) {
+            refuse(label + " moves along its line; expected a place and a velocity on it");
+        }
+    }
     moved.at = at;
     moved.velocity = velocity;
     require_motion(moved, label, false);
@@ -316,6 +326,35 @@ void Scene::set_coefficients(MaterialId material, double restitution, double fri
                        fmt::format("material \"{}\": ", of.name));
     of.restitution = restitution;
     of.friction = friction;
+}
+
+BodyId Scene::plate(const Plate& plate)
+{
+    const std::string label =
+        plate.name.empty() ? fmt::format("plate {}", bodies_.size()) : plate.name;
+    for (const Vector2& end : plate.ends) require_moderate(end, label + ": end");
+    require_moderate(plate.along, label + ": direction");
+    require_finite(who, label + ": speed", plate.speed);
+    const Vector2 half = 0.5 * (plate.ends[1] - plate.ends[0]);
+    if (!(norm(half) > 0)) refuse(fmt::format("{} has no length: its ends are equal", label));
+    Vector2 along = is_zero(plate.along) ? turned(half) : plate.along;
+    along = (1 / std::hypot(along[0], along[1])) * along;
+    add({.name = plate.name,
+         .at = plate.ends[0] + half,
+         .velocity = plate.speed * along,
+         .radius = 0,
+         .mass = plate.mass,
+         .material = plate.material},
+        "plate");
+    const auto body = static_cast<std::uint32_t>(bodies_.size() - 1);
+    plates_.push_back({body, half, along});
+    return {body};
+}
+
+const Scene::PlateShape* Scene::plate_of(std::uint32_t body) const noexcept
+{
+    const auto found = std::ranges::lower_bound(plates_, body, {}, &PlateShape::body);
+    return found != plates_.end() && found->body == body ? &*found : nullptr;
 }
 
 SurfaceId Scene::wall(const Wall& wall)
@@ -414,6 +453,9 @@ void Scene::spring(const Spring& spring)
         }
         if (system_of(end.index)) {
             refuse(fmt::format("a spring ends at {}, which is part of a system", name_of(end)));
+        }
+        if (plate_of(end.index)) {
+            refuse(fmt::format("a spring ends at {}, which is a plate", name_of(end)));
         }
     }
     if (spring.between[0] == spring.between[1]) {
@@ -551,6 +593,7 @@ void Scene::check_period() const
     const auto slowed = [](const Disc& body) { return body.drag > 0; };
     if (!springs_.empty()) refuse_all("springs");
     if (!systems_.empty()) refuse_all("systems");
+    if (!plates_.empty()) refuse_all("plates");
     if (std::ranges::any_of(bodies_, slowed)) refuse_all("bodies with drag");
     for (std::size_t c = 0; c < 2; ++c) {
         if (period[c] == 0) continue;
@@ -606,6 +649,10 @@ void Scene::check(double t_start) const
         check_motion_at(surface.motion, t_start, name_of(SurfaceId{s}));
         const Vector2 moved = displacement(surface.motion, t_start);
         for (Vector2& point : surface.points) point = point + moved;
+        if (!surface.is_wall && !plates_.empty()) {
+            refuse(fmt::format("{} is terrain that moves, which a scene with plates has not",
+                               name_of(SurfaceId{s})));
+        }
         const auto is_point = [](const Disc& body) { return body.radius == 0; };
         if (!surface.is_wall && std::ranges::any_of(bodies_, is_point)) {
             refuse(
@@ -619,6 +666,114 @@ void Scene::check(double t_start) const
     const std::vector<Vector2> places =
         systems_.empty() ? std::vector<Vector2>{} : places_at(t_start);
     require_apart(*this, places);
+    if (!plates_.empty()) check_plates();
+}
+
+namespace {
+
+/// [m] Distance of a body from the segment of a plate, minus the radius; of two parallel plates.
+double gap_to(const Scene& scene, const Scene::PlateShape& plate, std::uint32_t other)
+{
+    const Disc& body = scene.bodies()[other];
+    const Vector2& middle = scene.bodies()[plate.body].at;
+    Vector2 half = plate.half;
+    if (const auto* second = scene.plate_of(other)) {
+        half = (1 + norm(second->half) / norm(half)) * half;
+    }
+    return norm(body.at - nearest_on(middle - half, middle + half, body.at)) - body.radius;
+}
+
+}  // namespace
+
+/// Requires that plates are parallel, apart from all other bodies, and clear of terrain.
+void Scene::check_plates() const
+{
+    if (!systems_.empty()) refuse("a scene with plates has no systems, and there are some");
+    for (const PlateShape& plate : plates_) {
+        const double length = norm(plate.half);
+        const Vector2& middle = bodies_[plate.body].at;
+        const double own = rounding_of(middle, length);
+        const auto name = [&] { return name_of(BodyId{plate.body}); };
+        for (std::uint32_t i = 0; i < bodies_.size(); ++i) {
+            const PlateShape* other = plate_of(i);
+            if (other && other->body <= plate.body) continue;
+            if (other &&
+                std::fabs(cross(plate.half, other->half)) > 1e-12 * length * norm(other->half)) {
+                throw Misplaced(fmt::format("Scene: {} and {} are not parallel; expected parallel "
+                                            "plates",
+                                            name(), name_of(BodyId{i})),
+                                i);
+            }
+            const double gap = gap_to(*this, plate, i);
+            const double rounding = own + rounding_of(bodies_[i].at, bodies_[i].radius);
+            // The side of a point, or of a plate, on a plate would not be known.
+            if (bodies_[i].radius > 0 ? gap >= -rounding : gap > rounding) continue;
+            throw Misplaced(
+                bodies_[i].radius > 0
+                    ? fmt::format("Scene: {} and {} overlap by {:.3g} at the start", name(),
+                                  name_of(BodyId{i}), -gap)
+                    : fmt::format("Scene: {} lies on {} at the start; expected it on one side",
+                                  name_of(BodyId{i}), name()),
+                other ? i : plate.body);
+        }
+        for (const Surface& surface : surfaces_) {
+            if (!surface.is_wall) require_clear(plate, surface);
+        }
+    }
+}
+
+/// Requires that no terrain lies where a plate may come to between the walls that stop it.
+void Scene::require_clear(const PlateShape& plate, const Surface& surface) const
+{
+    const Vector2& middle = bodies_[plate.body].at;
+    const Vector2 across = turned(plate.along);
+    const double width = std::fabs(dot(plate.half, across));
+    const double depth = std::fabs(dot(plate.half, plate.along));
+    const double slack = rounding_of(middle, norm(plate.half));
+    double low = -std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (const Surface& wall : surfaces_) {
+        const double rate = wall.is_wall ? dot(plate.along, wall.normal) : 0;
+        if (std::fabs(rate) < 1e-12 || moves(wall.motion)) continue;
+        const double gap = dot(middle - wall.points[0], wall.normal);
+        (rate > 0 ? low : high) =
+            rate > 0 ? std::max(low, -gap / rate) : std::min(high, -gap / rate);
+    }
+    // Whether a part of the segment from a to b lies in the strip that is this wide.
+    const auto meets = [&](const Vector2& a, const Vector2& b, double wide) {
+        const double start = dot(a - middle, across);
+        const double rate = dot(b - a, across);
+        const double inside = wide - slack;
+        double from = 0;
+        double to = 1;
+        if (rate != 0) {
+            const auto [enters, leaves] =
+                std::minmax({(-inside - start) / rate, (inside - start) / rate});
+            from = std::max(from, enters);
+            to = std::min(to, leaves);
+        } else if (std::fabs(start) >= inside) {
+            return false;
+        }
+        if (from >= to) return false;
+        const auto place = [&](double part) {
+            return dot(a - middle, plate.along) + part * dot(b - a, plate.along);
+        };
+        const auto [near, far] = std::minmax({place(from), place(to)});
+        return far > low - depth + slack && near < high + depth - slack;
+    };
+    bool clear = true;
+    if (surface.is_arc()) {
+        const Vector2 reach = surface.radius * plate.along;
+        clear = !meets(surface.centre - reach, surface.centre + reach, width + surface.radius);
+    }
+    for (std::size_t k = 1; k < surface.points.size() && !surface.is_arc(); ++k) {
+        clear = clear && !meets(surface.points[k - 1], surface.points[k], width);
+    }
+    if (clear) return;
+    const auto index = static_cast<std::uint32_t>(&surface - surfaces_.data());
+    throw Misplaced(fmt::format("Scene: {} lies in the way of {}; plates meet walls, not terrain",
+                                name_of(SurfaceId{index}), name_of(BodyId{plate.body})),
+                    plate.body);
 }
 
 /// Checks all bodies beside a surface, where it is at the start.
@@ -638,8 +793,16 @@ void Scene::check_bodies_at(const Surface& surface, std::uint32_t index) const
                 name_of(SurfaceId{index}), rounding, bodies_[i].radius, name_of(BodyId{i})));
         }
         if (!systems_.empty() && system_of(i)) continue;
+        const PlateShape* plate = plate_of(i);
+        if (plate && !surface.is_wall) continue;  // see `check_plates`
         try {
-            require_outside(bodies_[i], surface);
+            if (plate) {
+                Disc outline = bodies_[i];
+                outline.radius = std::fabs(dot(plate->half, surface.normal));
+                require_outside(outline, surface);
+            } else {
+                require_outside(bodies_[i], surface);
+            }
         } catch (const std::invalid_argument& error) {
             throw Misplaced(error.what(), i);
         }

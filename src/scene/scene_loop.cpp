@@ -39,6 +39,8 @@ SceneLoop::SceneLoop(World& world, double t_end)
 void SceneLoop::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEvent> events)
 {
     members_.assign(bodies.begin(), bodies.end());
+    placed_ = members_;
+    std::erase_if(placed_, [&](std::uint32_t i) { return world_.plate(i) != nullptr; });
     pending_.begin(bodies);
     series_.begin(bodies);
     islands_.clear();
@@ -65,16 +67,16 @@ void SceneLoop::begin(std::span<const std::uint32_t> bodies, std::vector<SceneEv
 void SceneLoop::place_all()
 {
     const bool disc =
-        std::ranges::any_of(members_, [&](std::uint32_t i) { return world_.bodies[i].radius > 0; });
-    celled_ = members_.size() > 1 && disc;
+        std::ranges::any_of(placed_, [&](std::uint32_t i) { return world_.bodies[i].radius > 0; });
+    celled_ = placed_.size() > 1 && disc;
     on_terrain_ = world_.fixed_count > world_.wall_count;
     places_.clear();
-    for (const std::uint32_t i : members_) places_.push_back(world_.bodies[i].p);
+    for (const std::uint32_t i : placed_) places_.push_back(world_.bodies[i].p);
     if (celled_) fill_cells();
     if (!on_terrain_) return;
-    grid_.lay_terrain(world_, members_);
+    grid_.lay_terrain(world_, placed_);
     terrain_.begin(members_);
-    for (const std::uint32_t i : members_) {
+    for (const std::uint32_t i : placed_) {
         const Body& body = world_.bodies[i];
         terrain_[i].square = grid_.terrain(body).at(body.p);
     }
@@ -83,16 +85,16 @@ void SceneLoop::place_all()
 /// Makes cells for the bodies at `places_`.
 void SceneLoop::fill_cells()
 {
-    grid_.size(world_, members_, places_, !islands_.empty());
-    for (std::size_t k = 0; k < members_.size(); ++k) {
-        const std::uint32_t i = members_[k];
+    grid_.size(world_, placed_, places_, !islands_.empty());
+    for (std::size_t k = 0; k < placed_.size(); ++k) {
+        const std::uint32_t i = placed_[k];
         pending_[i].cell = grid_.insert(world_.bodies, i, places_[k]);
     }
     const SceneStatistics& s = world_.statistics;
     const std::uint64_t forced = world_.tuning.lay_after;
     if (work_.interval == 0) {
-        work_.interval = std::max<std::uint64_t>(acts_each * members_.size(), least_acts);
-        if (members_.size() <= few_bodies)
+        work_.interval = std::max<std::uint64_t>(acts_each * placed_.size(), least_acts);
+        if (placed_.size() <= few_bodies)
             work_.interval = std::numeric_limits<std::uint64_t>::max();
     }
     work_ = {.tests = s.predictions,
@@ -115,22 +117,22 @@ Vector2 SceneLoop::place_now(std::uint32_t i) const
 void SceneLoop::lay_cells_again()
 {
     places_.clear();
-    for (const std::uint32_t i : members_) places_.push_back(place_now(i));
+    for (const std::uint32_t i : placed_) places_.push_back(place_now(i));
     const std::vector<char> were_big = [&] {
         std::vector<char> out;
-        for (const std::uint32_t i : members_) out.push_back(world_.bodies[i].big ? 1 : 0);
+        for (const std::uint32_t i : placed_) out.push_back(world_.bodies[i].big ? 1 : 0);
         return out;
     }();
     fill_cells();
     ++world_.statistics.layings;
     bool changed = false;
-    for (std::size_t k = 0; k < members_.size(); ++k) {
-        changed = changed || world_.bodies[members_[k]].big != (were_big[k] != 0);
+    for (std::size_t k = 0; k < placed_.size(); ++k) {
+        changed = changed || world_.bodies[placed_[k]].big != (were_big[k] != 0);
     }
     if (changed && on_terrain_) {
-        grid_.lay_terrain(world_, members_);
-        for (std::size_t k = 0; k < members_.size(); ++k) {
-            const std::uint32_t i = members_[k];
+        grid_.lay_terrain(world_, placed_);
+        for (std::size_t k = 0; k < placed_.size(); ++k) {
+            const std::uint32_t i = placed_[k];
             terrain_[i].square = grid_.terrain(world_.bodies[i]).at(places_[k]);
         }
     }
@@ -418,12 +420,14 @@ void SceneLoop::consider_faces(std::uint32_t i)
 
 void SceneLoop::predict(std::uint32_t i)
 {
+    if (world_.plate(i)) return predict_plate(i);
     Pending& pending = pending_[i];
     pending.t = pending.crossing = no_instant;
     pending.kind = Pending::Kind::nothing;
     if (on_terrain_) terrain_[i].exit = {};
     const Body& body = world_.bodies[i];
     if (!world_.motions.empty() && !body.mapped) consider_moving(i);
+    if (!world_.plates.empty()) consider_plates(i);
     if (body.asleep) {
         if (celled_) offer(i);
     } else {
@@ -693,6 +697,7 @@ void SceneLoop::happen(std::uint32_t i)
         case Kind::border: return cross_border(i);
         case Kind::face: return impact(i);
         case Kind::presses_face:
+            if (world_.plate(i) && !world_.moves(pending.other)) return rest_on_stop(i);
             if (!world_.moves(pending.other) && rests_on_face(i)) return predict(i);
             return press(i, presses_on(i, world_.faces[pending.other]));
         case Kind::pair:

@@ -140,6 +140,8 @@ private:
     void consider_body(std::uint32_t i, std::uint32_t j);
     void consider_faces(std::uint32_t i);
     void consider_moving(std::uint32_t i);
+    void consider_plates(std::uint32_t i);
+    void predict_plate(std::uint32_t i);
     void consider_own(std::uint32_t i);
     void consider_border(std::uint32_t i);
     void cross_border(std::uint32_t i);
@@ -215,6 +217,13 @@ private:
     void gather(std::uint32_t i, const Pending& seed);
     void gather_faces(std::uint32_t slot, std::uint32_t sure);
     void gather_moving(std::uint32_t slot, std::uint32_t sure);
+    void gather_plate(std::uint32_t slot, const Pending* seed);
+    void gather_plates(std::uint32_t slot, std::uint32_t sure);
+    void gather_stops(std::uint32_t slot, std::uint32_t sure);
+    void try_plate(std::uint32_t slot, const World::Plate& plate, std::uint32_t i, bool sure);
+    void couple_plates();
+    void touch_sides();
+    void rest_on_stop(std::uint32_t i);
     void touch_face(std::uint32_t slot, const Vector2& p, std::uint32_t f, const Vector2& normal);
     [[nodiscard]] double loose_motion(std::uint32_t face, double size) const;
     [[nodiscard]] std::vector<Side> sides_of(std::uint32_t i, std::uint32_t sure) const;
@@ -222,6 +231,7 @@ private:
     void set_laws(Contact& contact, std::uint32_t a, std::uint32_t b) const;
     void try_pair(std::uint32_t slot, std::uint32_t j, bool sure);
     std::uint32_t slot_of(std::uint32_t body);
+    void set_spins();
     void apply(bool struck);
     std::uint32_t begin_record(std::uint32_t i, const Vector2& velocity,
                                const std::vector<Side>& sides);
@@ -280,6 +290,7 @@ private:
 
     World& world_;
     std::vector<std::uint32_t> members_;
+    std::vector<std::uint32_t> placed_;  ///< members that lie in cells: all but plates
     Instant t_end_;
     /// What happens later is left to a later `advance`.
     Instant pause_;
@@ -287,7 +298,7 @@ private:
     Grid grid_;
     bool celled_ = false;          ///< whether bodies can meet each other
     bool on_terrain_ = false;      ///< whether there is terrain that does not move
-    std::vector<Vector2> places_;  ///< of members, while cells are laid
+    std::vector<Vector2> places_;  ///< of `placed_`, while cells are laid
     EventQueue calendar_;
     PerBody<Pending> pending_;
     PerBody<OnTerrain> terrain_;  ///< where there is any

@@ -101,6 +101,13 @@ void SceneLoop::press(std::uint32_t i, const std::string& sentence)
 
 void SceneLoop::hand_over(const std::vector<std::uint32_t>& bodies, const std::string& sentence)
 {
+    for (const std::uint32_t i : bodies) {
+        if (!world_.plate(i)) continue;
+        return fail(Outcome::zeno, bodies,
+                    fmt::format("{} is in lasting contact, which of plates is followed on walls "
+                                "that do not move alone",
+                                called(i)));
+    }
     if (!contacts_.available()) {
         return fail(Outcome::zeno, bodies,
                     fmt::format("{}: lasting contact is not followed without "

@@ -22,9 +22,6 @@ constexpr std::uint32_t most_unmoved = 1000;
 /// The same, before the cluster is joined to a group in lasting contact.
 constexpr std::uint32_t unmoved_to_join = 8;
 
-/// Gaps, relative to the coordinates, that the steps of groups in contact leave.
-constexpr double loose = 1e-10;
-
 }  // namespace
 
 std::uint32_t SceneLoop::slot_of(std::uint32_t body)
@@ -48,12 +45,18 @@ void SceneLoop::gather(std::uint32_t i, const Pending& seed)
             for (const std::uint32_t other : world_.islands->members(body.island)) slot_of(other);
         }
         const bool first = slot == 0;
+        if (world_.plate(cluster_.bodies[slot])) {
+            gather_plate(slot, first ? &seed : nullptr);
+            continue;
+        }
         const bool pair = seed.kind == Pending::Kind::pair || seed.kind == Pending::Kind::presses;
         gather_faces(slot, first && !pair ? seed.other : none);
         if (celled_) gather_pairs(slot, first && pair ? seed.other : none);
+        if (!world_.plates.empty()) gather_plates(slot, first && pair ? seed.other : none);
     }
     cluster_.after = cluster_.before;
     if (!world_.accelerations.empty()) add_couplings();
+    if (!world_.plates.empty()) couple_plates();
     if (world_.any_turning) {
         for (const std::uint32_t body : cluster_.bodies) {
             cluster_.turning.push_back({world_.spin(body, now_), world_.turns[body].inverse_inertia,
@@ -445,13 +448,23 @@ std::uint32_t SceneLoop::begin_record(std::uint32_t i, const Vector2& velocity,
     body.p = place(body, s);
     // A velocity whose square underflows is set to 0: in a corner it would be halved forever.
     body.v = norm(velocity) < 1e-150 ? Vector2{} : velocity;
-    body.a = world_.gravity;
+    body.a = world_.fall(i);
     body.t = now_;
     ++body.version;
     body.asleep = false;
     if (world_.turning(i)) world_.set_spin(i, now_, world_.spin(i, now_));
     if (body.radius == 0) world_.remember(body, sides, flown);
     return std::exchange(body.held, none);
+}
+
+/// Lets discs turn with the spins that impacts have given them.
+void SceneLoop::set_spins()
+{
+    for (std::size_t k = 0; k < cluster_.turning.size(); ++k) {
+        const std::uint32_t i = cluster_.bodies[k];
+        const double spin = cluster_.turning[k].spin;
+        if (spin != world_.spin(i, now_)) world_.set_spin(i, now_, spin);
+    }
 }
 
 /// Writes new records of bodies whose velocity has changed, and predicts their meetings. Counts the
@@ -462,11 +475,7 @@ void SceneLoop::apply(bool struck)
     std::vector<std::uint32_t>& islands = slots_of_islands_;
     islands.clear();
     groups_struck_.clear();
-    for (std::size_t k = 0; k < cluster_.turning.size(); ++k) {
-        const std::uint32_t i = cluster_.bodies[k];
-        const double spin = cluster_.turning[k].spin;
-        if (spin != world_.spin(i, now_)) world_.set_spin(i, now_, spin);
-    }
+    set_spins();
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
         if (cluster_.after[k] == cluster_.before[k]) continue;
         const std::uint32_t i = cluster_.bodies[k];
@@ -495,10 +504,12 @@ void SceneLoop::apply(bool struck)
             continue;
         }
         const std::uint32_t held = begin_record(i, cluster_.after[k], cluster_.sides[k]);
+        if (world_.plate(i)) continue;
         const bool on_surface = std::ranges::any_of(
             cluster_.contacts, [&](const Contact& c) { return c.a == i && c.surface; });
         if (on_surface) settle(i, held);
     }
+    if (!world_.plates.empty()) touch_sides();
     result_.event_count += struck;
     for (const std::uint32_t island : islands) restart_island(island);
     for (const std::uint32_t group : groups_struck_) restart_group(group);

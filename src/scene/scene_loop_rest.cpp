@@ -232,7 +232,7 @@ void SceneLoop::leave_edge(std::uint32_t i)
 
 void SceneLoop::settle_at_start()
 {
-    for (const std::uint32_t i : members_) {
+    for (const std::uint32_t i : placed_) {
         Body& body = world_.bodies[i];
         const bool fixed = body.island != none || body.asleep || is_zero(world_.gravity);
         if (fixed && body.radius > 0) continue;

@@ -90,6 +90,7 @@ World::World(const Scene& from, const SceneOptions& with)
         }
         if (walls) wall_count = static_cast<std::uint32_t>(faces.size());
     }
+    add_plates();
     join_chains(from, wall_count, faces);
     blur_segments();
     add_arcs();
@@ -104,6 +105,25 @@ World::World(const Scene& from, const SceneOptions& with)
 
 World::~World() = default;
 
+void World::add_plates()
+{
+    if (scene.plates().empty()) return;
+    plate_numbers.assign(bodies.size(), none);
+    for (const Scene::PlateShape& shape : scene.plates()) {
+        const double length = norm(shape.half);
+        const double square = dot(shape.along, shape.along);  // 1 to rounding
+        Body& body = bodies[shape.body];
+        Plate plate{.body = shape.body, .along = shape.along, .length = length};
+        plate.normal = turned((1 / length) * shape.half);
+        plate.pull = (dot(gravity, shape.along) / square) * shape.along;
+        plate.mobility = body.inverse_mass / square;
+        plate.sides.assign(bodies.size(), 0);
+        body.a = plate.pull;
+        plate_numbers[shape.body] = static_cast<std::uint32_t>(plates.size());
+        plates.push_back(std::move(plate));
+    }
+}
+
 void World::find_laws()
 {
     const auto by_speed = [](const auto& law) { return detail::depends_on_speed(law.by_speed); };
@@ -114,7 +134,7 @@ void World::find_laws()
     plain_laws = plain_laws && !any_thermal;
     any_pairs = !scene.pairs().empty();
     any_turning = !turns.empty();
-    ordinary = plain_laws && !periodic && !any_turning;
+    ordinary = plain_laws && !periodic && !any_turning && plates.empty();
 }
 
 double World::restitution(std::uint32_t a, std::uint32_t b, double speed) const
@@ -364,7 +384,7 @@ void World::put_to_sleep()
 {
     for (std::uint32_t i = 0; i < bodies.size(); ++i) {
         Body& body = bodies[i];
-        if (body.island != none || !is_zero(body.v)) continue;
+        if (body.island != none || !is_zero(body.v) || plate(i)) continue;
         if (is_zero(gravity)) body.asleep = true;
         for (std::uint32_t f = 0; f < wall_count && !body.asleep; ++f) {
             const Face& wall = faces[f];

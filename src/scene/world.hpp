@@ -179,6 +179,54 @@ struct World {
         double rate = 0;  ///< [rad/s^2] while friction turns it on a surface
         double inverse_inertia = 0;
     };
+    /// A plate, and the sides of it on which bodies without a radius are.
+    struct Plate {
+        std::uint32_t body = 0;
+        Vector2 along{};      ///< of length 1: direction of the line on which it moves
+        Vector2 normal{};     ///< of length 1
+        double length = 0;    ///< [m] from its middle to an end
+        Vector2 pull{};       ///< [m/s^2] of gravity along the line
+        double mobility = 0;  ///< [1/kg] an impulse p adds mobility (along . p) along
+        /// Of points and plates, since the last contact: 1 where the normal points, else -1. Their
+        /// rounded places do not tell the side on which they touch.
+        std::vector<std::int8_t> sides{};
+
+        /// [m] How far it reaches in a direction from its middle.
+        [[nodiscard]] double reach(const Vector2& direction) const noexcept
+        {
+            return length * std::fabs(dot(turned(normal), direction));
+        }
+        /// Whether an impulse in this direction moves it.
+        [[nodiscard]] bool yields(const Vector2& direction) const noexcept
+        {
+            return std::fabs(dot(along, direction)) > 1e-12;
+        }
+    };
+    std::vector<Plate> plates;
+    std::vector<std::uint32_t> plate_numbers;  ///< of bodies, where there are plates
+
+    [[nodiscard]] const Plate* plate(std::uint32_t i) const noexcept
+    {
+        return plates.empty() || plate_numbers[i] == none ? nullptr : &plates[plate_numbers[i]];
+    }
+    /// Whether a body cannot follow every impulse: that of a system, or a plate.
+    [[nodiscard]] bool is_guided(std::uint32_t i) const noexcept
+    {
+        return bodies[i].mapped || plate(i) != nullptr;
+    }
+    /// [m] How far a body reaches from its middle towards a wall.
+    [[nodiscard]] double reach_to(std::uint32_t i, const Face& wall) const noexcept
+    {
+        const Plate* plate = this->plate(i);
+        return plate ? plate->reach(wall.normal) : bodies[i].radius;
+    }
+    /// [m/s^2] Acceleration of a body that nothing holds.
+    [[nodiscard]] Vector2 fall(std::uint32_t i) const noexcept
+    {
+        const Plate* plate = this->plate(i);
+        return plate ? plate->pull : gravity;
+    }
+
     std::vector<Turn> turns;  ///< of bodies, where a disc has an inertia
     bool any_turning = false;
 
@@ -258,7 +306,7 @@ struct World {
     bool plain_laws = true;
     bool any_thermal = false;
     bool any_pairs = false;  ///< of materials
-    bool ordinary = true;    ///< plain laws, and neither a period nor a disc that turns
+    bool ordinary = true;    ///< plain laws, and neither a period, a disc that turns nor a plate
 
     /// Of two materials; where it depends on the speed of approach, that of high speeds.
     [[nodiscard]] double restitution(std::uint32_t a, std::uint32_t b) const noexcept
@@ -347,6 +395,7 @@ private:
     [[nodiscard]] bool arrives_outside(const Body& body, std::uint32_t face, const Vector2& p,
                                        const Vector2& v) const;
     void find_laws();
+    void add_plates();
     void add_arcs();
     void add_images();
     void blur_segments();

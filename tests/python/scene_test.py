@@ -226,6 +226,23 @@ def test_circles_repeat_across_the_border_of_a_period():
         scene.arc((0, 0), radius=1, start=(1, 0), end=(0, 1))
 
 
+def test_a_plate_is_a_body_that_moves_along_a_line():
+    # A point of 1 kg at 3 m/s catches up with a plate of 2 kg at 1 m/s: they leave at 1/3 and 7/3 m/s.
+    scene = Scene()
+    scene.point((0, 0), velocity=(3, 0))
+    assert scene.plate((1, -1), (1, 1), along=(4, 0), speed=1, mass=2, name="piston") == 1
+    run = scene.simulate(1, sample_times=[0])
+    assert scene.body_names[1] == "piston" and scene.radii.tolist() == [0, 0]
+    assert run.events["t"] == pytest.approx([0.5], rel=1e-15)
+    assert run.events["other"].tolist() == [1] and not run.events["surface"][0]
+    assert run.velocities == pytest.approx(np.array([[1 / 3, 0], [7 / 3, 0]]), rel=1e-14)
+    assert run.energy[0] == pytest.approx(run.energy_at_end, rel=1e-14)
+    with pytest.raises(ValueError, match="along: found .*expected a direction"):
+        scene.plate((3, 0), (3, 1), along=(0, 0))
+    with pytest.raises(ValueError, match="Scene: plate 2 has no length"):
+        scene.plate((3, 0), (3, 0))
+
+
 def test_discs_turn_where_they_have_an_inertia():
     # Laid on a floor at 3 m/s, a solid disc rolls at 2 m/s after 0.5 s of slipping.
     scene = Scene(gravity=(0, -10))

@@ -8,7 +8,8 @@
 //
 // The time from t_start to t_end is divided into blocks of equal length. A quantity is the mean of
 // its values in the blocks, and its error the standard deviation of these divided by the root of
-// their number: true where the blocks are longer than the correlations.
+// their number: true where the blocks are longer than the correlations. Plates are no part of the
+// gas: an impact on one counts among those on surfaces.
 #pragma once
 
 #include <cstddef>

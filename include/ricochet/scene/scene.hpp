@@ -1,4 +1,5 @@
-// Contents of a scene: discs and points, walls, terrain and arcs, springs, gravity and drag.
+// Contents of a scene: discs, points and plates, walls, terrain and arcs, springs, gravity and
+// drag.
 //
 // A `Scene` holds and validates the description; `simulate` (scene/simulate.hpp) runs it. The plane
 // is vertical with gravity, horizontal without. Discs turn if they have an inertia;
@@ -75,7 +76,7 @@ struct MaterialId {
     std::uint32_t index = 0;
     friend bool operator==(MaterialId, MaterialId) = default;
 };
-/// Handle of a disc or a point.
+/// Handle of a disc, a point or a plate.
 struct BodyId {
     std::uint32_t index = 0;
     friend bool operator==(BodyId, BodyId) = default;
@@ -161,6 +162,18 @@ struct Point {
     MaterialId material{};
 };
 
+/// A straight plate that is guided along a line, such as a piston. It does not turn. Discs, points
+/// and parallel plates meet it from both sides, discs also at its ends, and walls stop it; what its
+/// guide takes of an impulse across the line is lost.
+struct Plate {
+    std::string name{};
+    std::array<Vector2, 2> ends{};  ///< [m] at the start, two that differ
+    Vector2 along{};  ///< direction of the line, of any length; zero: at a right angle to the plate
+    double speed = 0;  ///< [m/s] along it
+    double mass = 1;   ///< [kg], positive
+    MaterialId material{};
+};
+
 /// The half plane behind a line: bodies stay where (x - point) . normal is not negative.
 struct Wall {
     std::string name{};
@@ -234,6 +247,7 @@ public:
     void pair(const MaterialPair& pair);
     BodyId disc(const Disc& disc);
     BodyId point(const Point& point);
+    BodyId plate(const Plate& plate);
     SurfaceId wall(const Wall& wall);
     SurfaceId terrain(const Terrain& terrain);
     SurfaceId arc(const Arc& arc);
@@ -260,7 +274,7 @@ public:
     void check(double t_start = 0) const;
 
     [[nodiscard]] const Settings& settings() const noexcept { return settings_; }
-    /// All bodies. A point appears as a disc of radius 0.
+    /// All bodies. A point appears as a disc of radius 0, and so does a plate, at its middle.
     [[nodiscard]] std::span<const Disc> bodies() const noexcept { return bodies_; }
     [[nodiscard]] std::span<const Material> materials() const noexcept { return materials_; }
     [[nodiscard]] std::span<const Spring> springs() const noexcept { return springs_; }
@@ -277,6 +291,16 @@ public:
     [[nodiscard]] std::span<const System> systems() const noexcept { return systems_; }
     /// The system that a body is a disc of; null for any other body.
     [[nodiscard]] const System* system_of(std::uint32_t body) const noexcept;
+
+    /// A plate, which is among `bodies()`.
+    struct PlateShape {
+        std::uint32_t body = 0;
+        Vector2 half{};   ///< [m] from its middle to its second end
+        Vector2 along{};  ///< of length 1: direction of the line on which it moves
+    };
+    [[nodiscard]] std::span<const PlateShape> plates() const noexcept { return plates_; }
+    /// The plate that a body is; null for any other body.
+    [[nodiscard]] const PlateShape* plate_of(std::uint32_t body) const noexcept;
 
     /// A wall, a terrain or an arc. All kinds are in one list, in the order of their addition.
     struct Surface {
@@ -316,6 +340,8 @@ private:
     [[nodiscard]] std::vector<Vector2> places_at(double t) const;
     void require_outside(const Disc& body, const Surface& surface) const;
     void check_period() const;
+    void check_plates() const;
+    void require_clear(const PlateShape& plate, const Surface& surface) const;
     static void require_outside_arc(const Disc& body, const Surface& arc, const std::string& label);
     void check_bodies_at(const Surface& surface, std::uint32_t index) const;
 
@@ -327,6 +353,7 @@ private:
     std::vector<MaterialPair> pairs_;
     std::unordered_map<std::uint64_t, std::uint32_t> pair_numbers_;
     std::vector<System> systems_;
+    std::vector<PlateShape> plates_;
     std::unordered_map<std::string, std::uint32_t> names_;
 };
 

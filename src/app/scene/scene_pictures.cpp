@@ -56,6 +56,13 @@ std::vector<Vector2> points_of(const Scene::Surface& surface)
     return points;
 }
 
+/// The ends of a plate whose middle is at `at`.
+std::array<Vector2, 2> ends_of(const Scene::PlateShape& plate, const Vector2& at)
+{
+    return {{{at[0] - plate.half[0], at[1] - plate.half[1]},
+             {at[0] + plate.half[0], at[1] + plate.half[1]}}};
+}
+
 /// Widens the frame by the walls along its sides that are near.
 void include_near_walls(const SceneFile& file, const SceneRun& run, Frame& frame)
 {
@@ -88,6 +95,9 @@ Frame frame_of(const SceneFile& file, const SceneRun& run)
     const auto bodies = file.scene.bodies();
     const auto include_all = [&](const std::vector<BodyState>& states) {
         for (std::size_t i = 0; i < states.size(); ++i) include(states[i].at, bodies[i].radius);
+        for (const auto& plate : file.scene.plates()) {
+            for (const Vector2& end : ends_of(plate, states[plate.body].at)) include(end, 0);
+        }
     };
     for (const auto& states : run.samples) include_all(states);
     include_all(run.bodies);
@@ -218,6 +228,25 @@ void animate_shift(fmt::memory_buffer& out, const Track& track, const std::vecto
     fmt::format_to(to, "\"/>");
 }
 
+/// Draws a line [px], which is displaced by the entries of `track`.
+void draw_line(fmt::memory_buffer& out, const std::vector<std::array<double, 2>>& line, Track track,
+               const std::vector<double>& times)
+{
+    const auto to = std::back_inserter(out);
+    fmt::format_to(to, "<polyline points=\"");
+    for (const auto& [x, y] : line) fmt::format_to(to, "{:.1f},{:.1f} ", x, y);
+    fmt::format_to(to, "\"");
+    track.kept.push_back(0);
+    if (track.at.size() > 1) keep_between(track, times, 0, track.at.size() - 1);
+    if (track.at.size() < 2 || is_still(track)) {
+        fmt::format_to(to, "/>\n");
+        return;
+    }
+    fmt::format_to(to, ">");
+    animate_shift(out, track, times);
+    fmt::format_to(to, "</polyline>\n");
+}
+
 void animate(fmt::memory_buffer& out, std::string_view attribute, const Track& track,
              std::size_t coordinate, const std::vector<double>& times)
 {
@@ -244,6 +273,7 @@ void plot_scene(const SceneFile& file, const SceneRun& run, const std::filesyste
             ways += fmt::format("{:.6g} {:.6g}\n", states[i].at[0], states[i].at[1]);
         }
         ways += '\n';
+        if (file.scene.plate_of(static_cast<std::uint32_t>(i))) continue;
         const double shown = std::max(bodies[i].radius, 0.004 * frame.width());
         discs +=
             fmt::format("{:.6g} {:.6g} {:.6g}\n", run.bodies[i].at[0], run.bodies[i].at[1], shown);
@@ -252,6 +282,12 @@ void plot_scene(const SceneFile& file, const SceneRun& run, const std::filesyste
         const Vector2 moved = displacements(surface, run).back();
         for (const Vector2& p : line_of(surface, moved, frame)) {
             surfaces += fmt::format("{:.6g} {:.6g}\n", p[0], p[1]);
+        }
+        surfaces += '\n';
+    }
+    for (const auto& plate : file.scene.plates()) {
+        for (const Vector2& end : ends_of(plate, run.bodies[plate.body].at)) {
+            surfaces += fmt::format("{:.6g} {:.6g}\n", end[0], end[1]);
         }
         surfaces += '\n';
     }
@@ -292,29 +328,31 @@ std::string animated_scene(const SceneFile& file, const SceneRun& run)
         const auto moved = displacements(surface, run);
         const auto points = line_of(surface, moved.front(), frame);
         if (points.empty()) continue;
-        fmt::format_to(to, "<polyline points=\"");
-        for (const Vector2& p : points) {
-            fmt::format_to(to, "{:.1f},{:.1f} ", pixel(p)[0], pixel(p)[1]);
-        }
-        fmt::format_to(to, "\"");
+        std::vector<std::array<double, 2>> line;
+        for (const Vector2& p : points) line.push_back(pixel(p));
         Track track;
         for (const Vector2& d : moved) {
             track.at.push_back(
                 {scale * (d[0] - moved.front()[0]), scale * (moved.front()[1] - d[1])});
         }
-        track.kept.push_back(0);
-        if (track.at.size() > 1) keep_between(track, run.sample_times, 0, track.at.size() - 1);
-        if (track.at.size() < 2 || is_still(track)) {
-            fmt::format_to(to, "/>\n");
-            continue;
-        }
-        fmt::format_to(to, ">");
-        animate_shift(out, track, run.sample_times);
-        fmt::format_to(to, "</polyline>\n");
+        draw_line(out, line, track, run.sample_times);
+    }
+    for (const auto& plate : file.scene.plates()) {
+        Track track;
+        for (const auto& states : run.samples) track.at.push_back(pixel(states[plate.body].at));
+        if (track.at.empty()) track.at.push_back(pixel(run.bodies[plate.body].at));
+        const std::array<double, 2> middle = track.at.front();
+        const std::array half{scale * plate.half[0], -scale * plate.half[1]};
+        for (auto& at : track.at) at = {at[0] - middle[0], at[1] - middle[1]};
+        draw_line(out,
+                  {{middle[0] - half[0], middle[1] - half[1]},
+                   {middle[0] + half[0], middle[1] + half[1]}},
+                  track, run.sample_times);
     }
     fmt::format_to(to, "</g>\n<g stroke=\"#404040\" fill-opacity=\"0.7\">\n");
     constexpr std::array colours{"#0072b2", "#d55e00", "#009e73", "#e69f00", "#cc79a7", "#56b4e9"};
     for (std::size_t i = 0; i < run.bodies.size(); ++i) {
+        if (file.scene.plate_of(static_cast<std::uint32_t>(i))) continue;
         Track track;
         for (const auto& states : run.samples) track.at.push_back(pixel(states[i].at));
         if (track.at.empty()) track.at.push_back(pixel(run.bodies[i].at));

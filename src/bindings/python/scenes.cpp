@@ -490,6 +490,18 @@ void bind_parts(py::class_<PyScene, std::shared_ptr<PyScene>>& scene)
                              .material = {material}})
                      .index;
              })
+        .def("plate",
+             [](PyScene& self, const std::string& name, const std::array<Vector2, 2>& ends,
+                const Vector2& along, double speed, double mass, std::uint32_t material) {
+                 return self.scene
+                     .plate({.name = name,
+                             .ends = ends,
+                             .along = along,
+                             .speed = speed,
+                             .mass = mass,
+                             .material = {material}})
+                     .index;
+             })
         .def("wall",
              [](PyScene& self, const std::string& name, const Vector2& point, const Vector2& normal,
                 std::uint32_t material, const py::object& motion, double temperature) {
