@@ -30,14 +30,6 @@ namespace {
 namespace fs = std::filesystem;
 using PlainRun = Run<std::vector<double>>;
 
-/// A text in gnuplot's single quotes, in which only the quote is special.
-std::string single_quoted(std::string_view text)
-{
-    std::string out = "'";
-    for (const char c : text) out += c == '\'' ? std::string("''") : std::string(1, c);
-    return out + '\'';
-}
-
 /// t, x; the flights between events are separated by blank lines.
 std::string flights(const SystemEntry& system, const PlainRun& run)
 {
@@ -267,6 +259,13 @@ void plot(const SystemEntry& system, const RunSettings& settings, const PlainRun
                            script(system, settings, run));
     draw({{"flights", flights(system, run)}, {"jumps", jumps(run)}, {"marks", marks(run)}},
          plot_head(file, width, height) + text, file);
+}
+
+std::string single_quoted(std::string_view text)
+{
+    std::string out = "'";
+    for (const char c : text) out += c == '\'' ? std::string("''") : std::string(1, c);
+    return out + '\'';
 }
 
 std::string plot_head(const fs::path& file, int width, int height)

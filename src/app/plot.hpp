@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -34,6 +35,9 @@ struct PhasePlane {
 void plot(const SystemEntry& system, const RunSettings& settings,
           const Run<std::vector<double>>& run, const std::filesystem::path& file,
           const std::optional<PhasePlane>& plane = {});
+
+/// A text in gnuplot's single quotes, in which only the quote is special.
+[[nodiscard]] std::string single_quoted(std::string_view text);
 
 /// Names and contents of the files that a script reads.
 using PlotFiles = std::vector<std::pair<std::string, std::string>>;

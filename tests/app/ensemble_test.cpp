@@ -390,6 +390,52 @@ TEST_F(EnsembleApp, ScenesAreRunForEachRow)
 }
 #endif
 
+TEST_F(EnsembleApp, ResultsAreDrawnOverTheFirstColumn)
+{
+    const Words grid{"ensemble", "bouncing-ball", "--grid", "height=1:10:40", "--t-end", "3"};
+    const auto drawn = [&](const Words& more) {
+        Words words = grid;
+        words.insert(words.end(), more.begin(), more.end());
+        return run(words);
+    };
+    const Result first = drawn({"--events", "3", "--out", "o", "--plot", "o.svg"});
+    if (first.err.find("gnuplot-nox") != std::string::npos) GTEST_SKIP() << first.err;
+    ASSERT_EQ(first.status, 0) << first.err;
+    EXPECT_NE(first.out.find("o/results.csv, o.svg"), std::string::npos) << first.out;
+    // A point for each event that has happened, as gnuplot writes them, within its key of styles.
+    const auto points = [&](const std::string& file) {
+        const std::string picture = content(work() / file);
+        std::size_t count = 0;
+        for (std::size_t at = 0;
+             (at = picture.find("<use xlink:href='#gpPt6'", at)) != std::string::npos; ++at) {
+            ++count;
+        }
+        return count;
+    };
+    std::size_t events = 0;
+    const std::vector<Words> rows = table("o");
+    for (std::size_t k = 1; k < rows.size(); ++k) {
+        for (std::size_t c = 0; c < rows[0].size(); ++c) {
+            if (rows[0][c].starts_with("event_")) events += rows[k][c] != "nan";
+        }
+    }
+    EXPECT_GT(events, 60U);
+    EXPECT_EQ(points("o.svg"), events);
+    EXPECT_NE(content(work() / "o.svg").find("height [m]"), std::string::npos);
+    EXPECT_NE(content(work() / "o.svg").find("events [s]"), std::string::npos);
+    // Two results by name, from shares; the second column gives the colour.
+    for (const char* share : {"1/2", "2/2"}) {
+        const Result part =
+            drawn({"--grid", "restitution=0.5:0.9:3", "--out", "p", "--share", share});
+        ASSERT_EQ(part.status, 0) << part.err;
+    }
+    const Result merged =
+        run({"ensemble", "--merge", "p", "--plot", "p.svg", "--show", "u_final", "events"});
+    ASSERT_EQ(merged.status, 0) << merged.err;
+    EXPECT_EQ(points("p.svg"), 240U);
+    EXPECT_NE(content(work() / "p.svg").find("restitution"), std::string::npos);
+}
+
 TEST_F(EnsembleApp, SharesAreReadFromLaunchers)
 {
     const auto share = [&](const Words& environment) {
@@ -509,6 +555,15 @@ TEST_F(EnsembleApp, RequestsThatContradictThemselvesAreRefused)
     refused({"--merge", "none"}, {"no share"});
     refused({"--merge", ".", "--share", "1/2"}, {"alone"});
     refused({"--merge", ".", "--rtol", "1e-3"}, {"alone"});
+    refused({"bouncing-ball", "--table", "t.csv", "--out", "o", "--plot", "o.pdf"},
+            {".svg or .png"});
+    refused({"bouncing-ball", "--table", "t.csv", "--out", "o", "--show", "u_final"}, {"--plot"});
+    refused(
+        {"bouncing-ball", "--table", "t.csv", "--out", "o", "--plot", "o.svg", "--show", "u_end"},
+        {"'u_end' is not a result", "t_final, u_final, v_final"});
+    refused(
+        {"bouncing-ball", "--table", "t.csv", "--out", "o", "--plot", "o.svg", "--share", "1/2"},
+        {"a share is not drawn"});
     // This network was trained for one gravity.
     write("g.csv", "gravity\n9.81\n");
     refused({"bouncing-ball", "--table", "g.csv", "--out", "o", "--model",

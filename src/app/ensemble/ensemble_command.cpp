@@ -16,9 +16,11 @@
 #include "../input.hpp"
 #include "../interrupt.hpp"
 #include "../joined.hpp"
+#include "../plot.hpp"
 #include "../report.hpp"
 #include "../say.hpp"
 #include "../timing.hpp"
+#include "ensemble_plot.hpp"
 #include "ensemble_runs.hpp"
 #include "results.hpp"
 #include "ricochet/ensemble.hpp"
@@ -111,6 +113,33 @@ private:
     double next_ = 2;  ///< [s]
 };
 
+/// The picture that a request asks for.
+struct Picture {
+    EnsemblePicture shown;
+    std::string title;
+    fs::path file;
+
+    void draw(const std::vector<Field>& fields, const AllBlocks& blocks) const
+    {
+        plot_ensemble(shown, fields, title, blocks, file);
+    }
+};
+
+/// The picture of an ensemble of this set-up, nothing without `--plot`.
+/// @throws BadInput
+std::optional<Picture> requested_picture(const EnsembleRequest& request, const Json& setup)
+{
+    if (!request.plot) {
+        if (!request.show.empty()) throw BadInput("--show is of --plot, which is missing");
+        return {};
+    }
+    check_plot(*request.plot);
+    return Picture{.shown = ensemble_picture(fields_from(setup["fields"]), setup["columns"].size(),
+                                             request.show),
+                   .title = setup["system"],
+                   .file = *request.plot};
+}
+
 /// The execution of one process's share of the rows.
 class ShareRun {
 public:
@@ -200,12 +229,13 @@ public:
         return out;
     }
 
-    /// Writes the results where this is the only share.
-    void write(const fs::path& directory) const
+    /// Writes the results where this is the only share, and draws them.
+    void write(const fs::path& directory, const std::optional<Picture>& picture) const
     {
         AllBlocks blocks(all_.size());
         blocks.add(directory / file_name({}), file_.blocks());
         write_results(directory, fields_, runs_.table().rows, 1, blocks);
+        if (picture) picture->draw(fields_, blocks);
     }
 
 private:
@@ -297,6 +327,10 @@ int run_share(const EnsembleRequest& request)
 {
     const std::unique_ptr<RowRuns> runs = runs_of(request);
     const Share share = chosen_share(request.share);
+    if (request.plot && share.count > 1) {
+        throw BadInput("a share is not drawn; expected --plot with --merge");
+    }
+    const std::optional<Picture> picture = requested_picture(request, runs->setup(share.count));
     const fs::path directory = claim_directory(request, share);
 
     const Interrupts interrupts;
@@ -313,8 +347,9 @@ int run_share(const EnsembleRequest& request)
                     .seconds = spent.count()};
     const bool complete = summary.rows_kept == summary.rows;
     if (complete && share.count == 1) {
-        work.write(directory);
+        work.write(directory, picture);
         summary.files = result_files(directory);
+        if (picture) summary.files.push_back(picture->file.string());
     }
     print(request.json ? summary.json() : summary.text(false));
     if (!complete) {
@@ -368,9 +403,11 @@ Merged read_shares(const fs::path& directory)
     return out;
 }
 
-int merge(const fs::path& directory, bool json)
+int merge(const EnsembleRequest& request)
 {
+    const fs::path& directory = *request.merge;
     Merged all = read_shares(directory);
+    const std::optional<Picture> picture = requested_picture(request, all.setup);
     for (std::size_t b = 0; b < all.blocks->size(); ++b) {
         if (all.blocks->has(b)) continue;
         const Share share{.index = b % all.shares + 1, .count = all.shares};
@@ -381,14 +418,16 @@ int merge(const fs::path& directory, bool json)
     for (std::size_t b = 0; b < all.blocks->size(); ++b) all.tally.add(fields, all.blocks->rows(b));
     const std::size_t rows = all.setup["rows"];
     write_results(directory, fields, rows, all.shares, *all.blocks);
-    const Summary summary{.system = all.setup["system"],
-                          .share = {},
-                          .rows = rows,
-                          .rows_run = 0,
-                          .rows_kept = rows,
-                          .tally = all.tally,
-                          .files = result_files(directory)};
-    print(json ? summary.json() : summary.text(true));
+    if (picture) picture->draw(fields, *all.blocks);
+    Summary summary{.system = all.setup["system"],
+                    .share = {},
+                    .rows = rows,
+                    .rows_run = 0,
+                    .rows_kept = rows,
+                    .tally = all.tally,
+                    .files = result_files(directory)};
+    if (picture) summary.files.push_back(picture->file.string());
+    print(request.json ? summary.json() : summary.text(true));
     return 0;
 }
 
@@ -397,10 +436,14 @@ int merge(const fs::path& directory, bool json)
 int run_ensemble(const EnsembleRequest& request)
 {
     if (!request.merge) return run_share(request);
-    if (request != EnsembleRequest{.merge = request.merge, .json = request.json}) {
-        throw BadInput("--merge runs nothing; expected it alone, or with --json");
+    if (request != EnsembleRequest{.merge = request.merge,
+                                   .plot = request.plot,
+                                   .show = request.show,
+                                   .json = request.json}) {
+        throw BadInput(
+            "--merge runs nothing; expected it alone, or with --plot, --show and --json");
     }
-    return merge(*request.merge, request.json);
+    return merge(request);
 }
 
 int run_ensemble_dealt(const EnsembleRequest& request, const BlockDealer& dealer)
@@ -421,7 +464,9 @@ int run_ensemble_dealt(const EnsembleRequest& request, const BlockDealer& dealer
     }
     dealer.wait_for_all();  // now all of them are complete
     if (Interrupts::any()) return ended_early("and the same call goes on");
-    return dealer.place.index == 1 ? merge(directory, request.json) : 0;
+    if (dealer.place.index != 1) return 0;
+    return merge(
+        {.merge = directory, .plot = request.plot, .show = request.show, .json = request.json});
 }
 
 }  // namespace ricochet::app

@@ -31,6 +31,8 @@ struct EnsembleRequest {
     std::optional<std::string> share{};  ///< k/n
     std::optional<std::filesystem::path> merge{};
     std::optional<unsigned> threads{};
+    std::optional<std::filesystem::path> plot{};
+    std::vector<std::string> show{};  ///< results in the plot
     bool json = false;
 
     friend bool operator==(const EnsembleRequest&, const EnsembleRequest&) = default;

@@ -41,13 +41,20 @@ void add_ensemble(CLI::App& app, int& status, EnsembleHandler handler)
     add_text(command, "--merge", request->merge, "DIR", "join the shares there, and run nothing");
     add_whole_number(command, "--threads", request->threads, 1, 1024,
                      "default: one for each core that may be used");
+    add_text(command, "--plot", request->plot, "FILE",
+             "draw the results over the first column with gnuplot, as .svg or .png; a second one "
+             "gives the colour");
+    command
+        .add_option("--show", request->show,
+                    "results in the plot; default: the times of --events, or the final state")
+        ->type_name("NAME ...");
     command.add_flag("--json", request->json, "print JSON");
     add_run_options(command, request->run);
     command.footer(
         "Examples:\n"
         "  ricochet ensemble bouncing-ball --count 1000 --vary height=1:10 --out balls\n"
         "  ricochet ensemble bouncing-ball --table balls.csv --out balls --t-end 20\n"
-        "  ricochet ensemble bin.json --grid gravity.y=-10:-1:10 --out bins\n"
+        "  ricochet ensemble bin.json --grid gravity.y=-10:-1:10 --out bins --plot bins.svg\n"
         "  mpirun -n 4 ricochet ensemble bouncing-ball --table balls.csv --out balls\n"
         "  ricochet ensemble --merge balls\n\n"
         "A call that was ended early is repeated as it was, and goes on where it ended. The\n"
