@@ -308,7 +308,8 @@ void Scene::set_start(BodyId body, const Vector2& at, const Vector2& velocity)
             return std::fabs(plate->along[0] * v[1] - plate->along[1] * v[0]);
         };
         const double size = std::hypot(at[0], at[1]) + std::hypot(moved.at[0], moved.at[1]);
-        if (across(way) > 1e-12 * size || across(velocity) > 1e-12 * std::hypot(velocity[0], velocity[1])) {
+        if (across(way) > 1e-12 * size ||
+            across(velocity) > 1e-12 * std::hypot(velocity[0], velocity[1])) {
             refuse(label + " moves along its line; expected a place and a velocity on it");
         }
     }
