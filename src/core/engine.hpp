@@ -500,6 +500,8 @@ public:
     }
     /// Goes on from a place that has been read together with the guards.
     void go_on_from(const StepStart<X>& place);
+    /// See `Step::keep_before`.
+    void keep_before(double last) noexcept { step_.keep_before(last); }
 
     /// What events change, as it is at the start of a step.
     struct Checkpoint {

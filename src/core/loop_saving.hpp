@@ -44,6 +44,7 @@ template <class X, bool single>
 inline void Loop<X, single>::go_on_from_place()
 {
     engine_.go_on_from(place_);
+    if (timed_) engine_.keep_before(last_of_flow_);
     next_review_ = 0;
 }
 
@@ -62,6 +63,8 @@ inline void Loop<X, single>::visit_state(Visitor&& visit)
     visit(longest_step_);
     engine_.visit_time_event(visit);
     if (timed_) visit(place_.is_beyond);
+    if constexpr (std::remove_cvref_t<Visitor>::saves) last_of_flow_ = now().last_of_flow();
+    if (timed_) visit(last_of_flow_);
     engine_.holds().visit(visit);
     engine_.visit_ended(visit);
     visit(result().outcome);

@@ -62,6 +62,8 @@ inline void Loop<X, single>::refuse_bad_place() const
     require(has_ended() ||
                 (all_finite(place_.x) && all_finite(place_.remainder) && all_finite(place_.rate)),
             "the state");
+    require(!timed_ || std::isinf(last_of_flow_) || !lies_before(last_of_flow_, place_.t.value),
+            "the last time of the flow");
     require(h_next() > 0 && std::isfinite(h_next()) &&
                 (!error_controlled_ || h_next() <= options().h_max),
             "the next step");

@@ -612,6 +612,20 @@ public:
         if (at.is_beyond) flow_start() = beside(at.t.value, false);
     }
 
+    /// The last time [s] at which the flow is evaluated, before a jump at a time event that an
+    /// attempt has met; infinite without one.
+    [[nodiscard]] double last_of_flow() const noexcept
+    {
+        const double last = state_.backward ? state_.flow_from : state_.flow_to;
+        const bool of_span = last == (state_.backward ? system_.earliest() : system_.latest());
+        return of_span ? std::numeric_limits<double>::infinity() : last;
+    }
+    /// Goes on with what `last_of_flow` has told.
+    void keep_before(double last) noexcept
+    {
+        if (std::isfinite(last)) flow_end() = last;
+    }
+
     /// Takes note that the span of the run has changed.
     void renew_span() noexcept
     {

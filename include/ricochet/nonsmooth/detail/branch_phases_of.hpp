@@ -209,7 +209,7 @@ public:
     {
         const Vector w0 = vector(x0), w1 = vector(x1);
         // A set at the end of the last step has moved the state.
-        if (held_end_.t == t0 && held_end_.w != w0) held_.forget();
+        if (held_end_.t == t0 && held_end_.w != w0) forget_held();
         known_.t = t1;
         known_.branches = b;
         known_.w = w1;
@@ -221,7 +221,7 @@ public:
             const double before = std::nextafter(t1, t0);
             typename Modes::Motion motion;
             modes_.rooms(b, before, w1, motion, rooms);
-            held_.forget();
+            forget_held();
             fraction = fraction_to({b, t0, before, w0, w1}, motion.rate, rooms);
             // The loop does not see an exit that the jump hides.
             if (fraction == beyond_at_end) return 0.5;
@@ -410,6 +410,11 @@ private:
         return out;
     }
 
+    void forget_held()
+    {
+        held_.forget();
+        held_end_.h = 0;
+    }
     struct HeldTo {
         Mode b;
         double t0, t1;
