@@ -13,9 +13,9 @@ namespace ricochet::app {
 
 /// Places among the fields of a row of what a picture shows.
 struct EnsemblePicture {
-    std::size_t across = 0;                        ///< the first column, or the number of the row
-    std::size_t colour = 0;                        ///< the second column; 0: there is none
-    std::vector<std::vector<std::size_t>> panels;  ///< results, those of one panel together
+    std::size_t across = 0;                          ///< the first column, or the number of the row
+    std::size_t colour = 0;                          ///< the second column; 0: there is none
+    std::vector<std::vector<std::size_t>> panels{};  ///< results, those of one panel together
 };
 
 /// What to show of rows with these fields, the first of which are the number and `columns` columns.
