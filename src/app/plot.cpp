@@ -264,7 +264,10 @@ void plot(const SystemEntry& system, const RunSettings& settings, const PlainRun
 std::string single_quoted(std::string_view text)
 {
     std::string out = "'";
-    for (const char c : text) out += c == '\'' ? std::string("''") : std::string(1, c);
+    for (const char c : text) {
+        if (static_cast<unsigned char>(c) < ' ') continue;
+        out += c == '\'' ? std::string("''") : std::string(1, c);
+    }
     return out + '\'';
 }
 

@@ -128,16 +128,6 @@ Json json(const Description& d, const fmi::Event& event)
     return out;
 }
 
-std::string single_quoted(std::string_view text)
-{
-    std::string out = "'";
-    for (const char c : text) {
-        if (static_cast<unsigned char>(c) < ' ') continue;
-        out += c == '\'' ? std::string("''") : std::string(1, c);
-    }
-    return out + "'";
-}
-
 std::string variable_line(const fmi::Variable& v)
 {
     std::string start;
