@@ -142,19 +142,6 @@ TEST(PhasesEnds, ABoundThatIsNoNumberIsRefusedAtTheStart)
               "the lower one first");
 }
 
-/// The second y is zero for ever.
-struct BlindToOne : Bounded<2>::Motion {
-    static void observe(Eigen::Matrix2d& e) { e << 1, 0, 0, 0; }
-};
-
-TEST(PhasesEnds, AYThatDoesNotReadTheStateIsRefused)
-{
-    const std::string sentence =
-        "inclusion: a row of E must read the state; nothing but zeros has row 1";
-    const BlindToOne blind{{-1, 1}};
-    EXPECT_EQ(refusal([&] { (void)hand_over(blind, {1, 1}, {.t_end = 1}); }), sentence);
-}
-
 TEST(PhasesEnds, AnEmptySetIsRefusedAtTheStart)
 {
     EXPECT_EQ(
