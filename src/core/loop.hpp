@@ -718,7 +718,7 @@ private:
     Mode sample_mode_ = 0;
     ShownStep shown_step_;
     StepStart<X> place_;
-    double last_of_flow_ = 0;  ///< of that place, see `Step::last_of_flow`
+    double last_of_flow_ = 0;     ///< of that place, see `Step::last_of_flow`
     std::unique_ptr<Mark> mark_;  ///< null: the run does not continue after an exception
 };
 
