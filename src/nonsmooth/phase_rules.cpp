@@ -58,11 +58,11 @@ void PhaseRules::flow(Kind kind, double t, const double* x, double* dxdt)
 }
 
 double PhaseRules::fraction_of_held(BranchPhases& inclusion, Mode b, double t0, const double* x0,
-                                    double t1, const double* x1)
+                                    double t1, const double* x1, bool may_jump)
 {
     // Below that length the motion has no smoothness that steps could follow.
     if (t1 - t0 <= shortest_) return 1;
-    const double fraction = inclusion.fraction_of_held(b, t0, x0, t1, x1);
+    const double fraction = inclusion.fraction_of_held(b, t0, x0, t1, x1, may_jump);
     memory_.contradicts = fraction > 0 ? 0 : 1;
     return fraction > 0 ? fraction : 0.1;
 }

@@ -113,7 +113,8 @@ public:
     void flow(Kind kind, double t, const double* x, double* dxdt);
     /// See `BranchPhases::fraction_of_held`.
     [[nodiscard]] double fraction_of_held(BranchPhases& inclusion, Mode b, double t0,
-                                          const double* x0, double t1, const double* x1);
+                                          const double* x0, double t1, const double* x1,
+                                          bool may_jump);
 
     /// The guard of `BranchPhases` that is guard `which` of the phases.
     [[nodiscard]] std::size_t in_branches(std::size_t which) const noexcept

@@ -439,7 +439,7 @@ private:
         const InBranches& by = in_branches(step.mode);
         const double fraction =
             rules_.fraction_of_held(*by.inclusion, by.branches, step.start.value, step.x0.data(),
-                                    step.time(h), step.x1.data());
+                                    step.time(h), step.x1.data(), own_.timed());
         if (fraction == 1) return error;
         return std::max(error, std::pow(0.9 / fraction, free_->error_order + 1));
     }

@@ -137,7 +137,7 @@ private:
     /// The series of flow and guards; null if one of them is no formula.
     [[nodiscard]] std::shared_ptr<const FormulaSeries> series_of_formulas(
         const double* parameters = nullptr) const;
-    /// The series of a run, which is that of all runs where there are no parameters.
+    /// The series of a run: without parameters, the one of all runs.
     [[nodiscard]] std::shared_ptr<const FormulaSeries> series_for(const Request& request) const
     {
         return request.parameters && series_ ? series_of_formulas(request.parameters) : series_;

@@ -173,8 +173,9 @@ public:
     [[nodiscard]] virtual double rate_of(std::size_t i, const double* dxdt) const = 0;
     /// The fraction of a step that would follow the held reactions; 1 if the step does, and
     /// negative where one was beyond its bound at the start.
+    /// @param may_jump  the load may jump at t1: there are time events
     [[nodiscard]] virtual double fraction_of_held(Mode b, double t0, const double* x0, double t1,
-                                                  const double* x1) = 0;
+                                                  const double* x1, bool may_jump) = 0;
 
     // --- implicit phases ---
 

@@ -205,7 +205,7 @@ public:
         return modes_.rate_of(index(i), vector(dxdt));
     }
     [[nodiscard]] double fraction_of_held(Mode b, double t0, const double* x0, double t1,
-                                          const double* x1) override
+                                          const double* x1, bool may_jump) override
     {
         const Vector w0 = vector(x0), w1 = vector(x1);
         // A set at the end of the last step has moved the state.
@@ -215,14 +215,15 @@ public:
         known_.w = w1;
         typename Modes::Rooms rooms;
         modes_.rooms(b, t1, w1, known_.motion, rooms);
-        double fraction = fraction_to({b, t0, t1, w0, w1}, known_.motion.rate, rooms);
-        if (fraction != 1 && this->jumps(t1, x1)) {
+        HeldStep<Vector> step{b, t0, t1, w0, w1, options_.event_tolerance};
+        double fraction = fraction_to(step, known_.motion.rate, rooms);
+        if (may_jump && fraction != 1 && this->jumps(t1, x1)) {
             // A load that jumps at the end of the step belongs to the next one.
-            const double before = std::nextafter(t1, t0);
+            step.t1 = std::nextafter(t1, t0);
             typename Modes::Motion motion;
-            modes_.rooms(b, before, w1, motion, rooms);
+            modes_.rooms(b, step.t1, w1, motion, rooms);
             forget_held();
-            fraction = fraction_to({b, t0, before, w0, w1}, motion.rate, rooms);
+            fraction = fraction_to(step, motion.rate, rooms);
             // The loop does not see an exit that the jump hides.
             if (fraction == beyond_at_end) return 0.5;
         }
@@ -415,30 +416,19 @@ private:
         held_.forget();
         held_end_.h = 0;
     }
-    struct HeldTo {
-        Mode b;
-        double t0, t1;
-        const Vector &w0, &w1;
-    };
     /// The fraction of a step with these rooms at its end that would follow the held reactions;
     /// `beyond_at_end` where one has passed its bound by then, and negative where one was beyond it
     /// at the start.
-    [[nodiscard]] double fraction_to(const HeldTo& step, const Vector& rate,
+    [[nodiscard]] double fraction_to(const HeldStep<Vector>& step, const Vector& rate,
                                      const typename Modes::Rooms& rooms)
     {
-        const HeldStep<Vector> of{.mode = step.b,
-                                  .t0 = step.t0,
-                                  .t1 = step.t1,
-                                  .w0 = step.w0,
-                                  .w1 = step.w1,
-                                  .event_tolerance = options_.event_tolerance};
         for (const double room : rooms) {
             if (!(room < 0)) continue;
-            if (!exits(step.b, step.t0, step.w0, rooms)) return -1;
-            return held_.passes_once(modes_, of, rate, rooms) ? beyond_at_end : 0.5;
+            if (!exits(step.mode, step.t0, step.w0, rooms)) return -1;
+            return held_.passes_once(modes_, step, rate, rooms) ? beyond_at_end : 0.5;
         }
-        const double fraction = held_.fraction(modes_, of, rate, rooms);
-        held_end_ = {step.t1, step.t1 - step.t0, step.b, step.w1};
+        const double fraction = held_.fraction(modes_, step, rate, rooms);
+        held_end_ = {step.t1, step.h(), step.mode, step.w1};
         return held_.starts_beyond() ? -1 : fraction;
     }
     static constexpr double beyond_at_end = 2;

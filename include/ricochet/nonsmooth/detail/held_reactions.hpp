@@ -47,10 +47,8 @@ public:
         starts_beyond_ = false;
         if (!(step.t1 > step.t0)) return 1;
         const double h = step.h();
-        const bool goes_on = end_.t == step.t0 && end_.mode == step.mode;
+        const bool goes_on = begin(modes, step);
         end_.mode = step.mode;
-        if (!goes_on) evaluate(modes, step.t0, step.w0, h, end_);
-        start_ = end_;
         end_.rate = rate;
         end_.rooms = rooms;
         find_change(modes, step.t1, step.w1, -h, end_);
@@ -76,12 +74,12 @@ public:
     [[nodiscard]] bool passes_once(const Modes& modes, const Step& step, const Vector& rate,
                                    const Rooms& rooms)
     {
-        start_.mode = step.mode;
-        evaluate(modes, step.t0, step.w0, step.h(), start_);
+        const bool is_like_the_last = begin(modes, step) && step.h() <= 2 * length_;
         End end{step.t1, step.mode, rate, rooms, {}};
         find_change(modes, step.t1, step.w1, -step.h(), end);
         std::array<bool, std::tuple_size_v<Rooms>> beyond{};
         for (const double s : {0.13711, 0.38196601125010515, 0.78934, 1.0}) {
+            if (is_like_the_last && s != 0.38196601125010515 && s < 1) continue;
             if (s < 1) go_inside(modes, step, end.rate, s);
             const Rooms& here = s < 1 ? rooms_ : rooms;
             for (std::size_t k = 0; k < here.size(); ++k) {
@@ -128,6 +126,18 @@ private:
         Rooms rooms{}, change{};
     };
 
+    /// Knows the start of a step. Returns whether it is the end of the last one.
+    bool begin(const Modes& modes, const Step& step)
+    {
+        const bool goes_on = end_.t == step.t0 && end_.mode == step.mode;
+        if (goes_on) {
+            start_ = end_;
+        } else {
+            start_.mode = step.mode;
+            evaluate(modes, step.t0, step.w0, step.h(), start_);
+        }
+        return goes_on;
+    }
     /// Evaluates an end of a step in its mode. `ahead`: the step, with its sign as seen from this
     /// end.
     void evaluate(const Modes& modes, double t, const Vector& w, double ahead, End& end)

@@ -235,8 +235,8 @@ public:
         }
         return rate;
     }
-    [[nodiscard]] double fraction_of_held(Mode, double, const double*, double,
-                                          const double*) override
+    [[nodiscard]] double fraction_of_held(Mode, double, const double*, double, const double*,
+                                          bool) override
     {
         return 1;
     }
