@@ -164,20 +164,28 @@ void Impacts::strike(Cluster& cluster, Contact& contact)
         turn(cluster, contact, contact.tangential);
     } else {
         push(cluster, contact, contact.impulse * contact.normal);
-        if (!cluster.couplings.empty() && contact.restitution == 1) undo_gain(cluster, contact, u);
+        if (rounds_alike(cluster, contact)) undo_gain(cluster, contact, u);
     }
 }
 
-/// Corrects the impulse of an elastic impact of a plate, at the approach u, by what rounding has
-/// changed the energy, here and in earlier impacts. Masses and directions of a plate are rounded in
-/// the same way each time: uncorrected, the energy would drift in proportion to their number.
+/// Whether rounding changes the energy in the same way at each such elastic impact: masses and
+/// directions of plates and normals of slanted walls are the same each time, and what |n|^2 differs
+/// from 1 by is mostly below the last place of an impulse.
+bool Impacts::rounds_alike(const Cluster& cluster, const Contact& contact)
+{
+    if (contact.restitution != 1) return false;
+    return (contact.surface && is_slanted(contact.normal)) || !cluster.couplings.empty();
+}
+
+/// Corrects the impulse of an elastic impact, at the approach u, by what rounding has changed the
+/// energy, here and in earlier impacts that round alike: uncorrected, the energy would drift in
+/// proportion to their number.
 void Impacts::undo_gain(Cluster& cluster, Contact& contact, double u)
 {
     if (contact.moving || !world_.accelerations.empty()) return;
     const auto change = [&](std::uint32_t body, std::uint32_t slot) {
-        const Vector2& before = before_wave_[slot];
-        const Vector2& after = cluster.after[slot];
-        return 0.5 * world_.scene.bodies()[body].mass * dot(after - before, after + before);
+        return 0.5 * world_.scene.bodies()[body].mass *
+               difference_of_squares(cluster.after[slot], before_wave_[slot]);
     };
     const auto gain = [&] {
         const double first = change(contact.a, contact.slot_a);

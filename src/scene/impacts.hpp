@@ -104,6 +104,7 @@ private:
     [[nodiscard]] static double slip(const Cluster& cluster, const Contact& contact);
     static void turn(Cluster& cluster, const Contact& contact, double tangential);
     void strike(Cluster& cluster, Contact& contact);
+    [[nodiscard]] static bool rounds_alike(const Cluster& cluster, const Contact& contact);
     void undo_gain(Cluster& cluster, Contact& contact, double u);
     void strike_thermal(Cluster& cluster, Contact& contact) const;
     [[nodiscard]] bool apply_laws(Cluster& cluster);
@@ -123,7 +124,7 @@ private:
     std::vector<std::uint32_t> struck_;  ///< contacts of the current wave
     std::vector<Vector2> before_wave_;
     std::vector<Vector2> impulses_before_;
-    double gained_ = 0;  ///< [J] by rounding in impacts of plates, to be undone
+    double gained_ = 0;  ///< [J] by rounding in impacts that round alike, to be undone
 };
 
 }  // namespace ricochet::detail

@@ -54,13 +54,15 @@ bool SceneLoop::bounces_from_start()
 }
 
 /// The impact of a body alone on the only wall, with the arithmetic of `Impacts` but without
-/// friction. Nothing where the body may stay on the wall.
+/// friction. Nothing where the body may stay on the wall, or `Impacts` corrects what rounding
+/// gains.
 std::optional<SceneLoop::Strike> SceneLoop::strike_on_wall(const Body& body, const Vector2& arrives,
                                                            const Instant& t) const
 {
     const Face& wall = world_.faces[0];
     const double approach = -dot(arrives, wall.normal);
     const double restitution = world_.restitution(body.material, wall.material);
+    if (restitution == 1 && is_slanted(wall.normal)) return {};
     Strike strike{.arrives = arrives, .leaves = {}, .impulse = {}};
     const double whole = (1 + restitution) * approach * (1 / body.inverse_mass);
     const double size = whole - whole * excess_of_square(wall.normal);

@@ -5,7 +5,9 @@
 #pragma once
 
 #include <cmath>
+#include <utility>
 
+#include "ricochet/instant.hpp"
 #include "ricochet/scene/scene.hpp"
 
 namespace ricochet::detail {
@@ -39,6 +41,10 @@ struct Square {
 {
     return a[0] == 0 && a[1] == 0;
 }
+[[nodiscard]] inline bool is_slanted(const Vector2& a) noexcept
+{
+    return a[0] != 0 && a[1] != 0;
+}
 [[nodiscard]] inline bool is_finite(const Vector2& a) noexcept
 {
     return std::isfinite(a[0]) && std::isfinite(a[1]);
@@ -54,6 +60,18 @@ struct Square {
 [[nodiscard]] inline double excess_of_square(const Vector2& n) noexcept
 {
     return std::fma(n[0], n[0], std::fma(n[1], n[1], -1.0));
+}
+
+/// |a|^2 - |b|^2, also where the difference is a rounding of either.
+[[nodiscard]] inline double difference_of_squares(const Vector2& a, const Vector2& b) noexcept
+{
+    TwoSum sum{0, 0};
+    for (const auto& [x, y] : {std::pair{a[0], a[0]}, {b[0], -b[0]}, {a[1], a[1]}, {b[1], -b[1]}}) {
+        const TwoSum product = two_product(x, y);
+        const TwoSum next = two_sum(sum.value, product.value);
+        sum = {next.value, sum.remainder + (next.remainder + product.remainder)};
+    }
+    return sum.value + sum.remainder;
 }
 
 /// The point of the segment from a to b that is nearest to p.
