@@ -272,7 +272,8 @@ private:
     [[nodiscard]] double slips_for(std::uint32_t i) const;
     void stop_turning(std::uint32_t i, const std::vector<std::uint32_t>& faces);
     void leave_edge(std::uint32_t i);
-    [[nodiscard]] std::vector<std::uint32_t> touching_faces(std::uint32_t i) const;
+    /// Faces that a body touches; valid until the next call.
+    [[nodiscard]] const std::vector<std::uint32_t>& touching_faces(std::uint32_t i);
     void note(SceneEvent::Kind kind, std::uint32_t i, std::uint32_t face, const Vector2& velocity);
     void count_held();
     void sample_until(const Instant& t, bool inclusive, Samples& samples);
@@ -321,6 +322,7 @@ private:
     std::vector<std::uint32_t> changed_;
     std::vector<std::uint32_t> slots_of_islands_;
     std::vector<std::uint32_t> groups_struck_;
+    std::vector<std::uint32_t> touched_;  ///< see `touching_faces`
     std::vector<std::pair<std::uint32_t, Vector2>> velocities_;
     /// After this many impacts of a body at mean intervals within the resolution of time, its
     /// cluster collapses.

@@ -6,10 +6,10 @@
 
 namespace ricochet::detail {
 
-std::vector<std::uint32_t> SceneLoop::touching_faces(std::uint32_t i) const
+const std::vector<std::uint32_t>& SceneLoop::touching_faces(std::uint32_t i)
 {
     const Body& body = world_.bodies[i];
-    std::vector<std::uint32_t> faces;
+    touched_.clear();
     const auto look = [&](std::uint32_t f) {
         const Face& face = world_.faces[f];
         if (is_round(face.kind)) return;
@@ -20,14 +20,14 @@ std::vector<std::uint32_t> SceneLoop::touching_faces(std::uint32_t i) const
         const bool known =
             std::ranges::any_of(body.sides, [&](std::uint32_t side) { return side / 2 == f; });
         if (known || gap <= rounding) {
-            faces.push_back(f);
+            touched_.push_back(f);
         }
     };
     for (std::uint32_t f = 0; f < world_.wall_count; ++f) look(f);
     if (on_terrain_) {
         for (const std::uint32_t f : faces_of(i)) look(f);
     }
-    return faces;
+    return touched_;
 }
 
 /// The faces of `faces` that hold a body against gravity, where a speed of `gained` [m/s] is below
@@ -82,7 +82,7 @@ void SceneLoop::settle(std::uint32_t i, std::uint32_t was)
 {
     Body& body = world_.bodies[i];
     const Vector2 velocity = body.v;
-    const std::vector<std::uint32_t> faces = touching_faces(i);
+    const std::vector<std::uint32_t>& faces = touching_faces(i);
     // In a corner, a body that would rise by less than the rounding of its place does not move.
     const double pull_of_all = norm(world_.gravity);
     const double rise = faces.size() > 1 ? 4 * World::rounding(body.p, body.radius) : 0;
@@ -236,7 +236,7 @@ void SceneLoop::settle_at_start()
         Body& body = world_.bodies[i];
         const bool fixed = body.island != none || body.asleep || is_zero(world_.gravity);
         if (fixed && body.radius > 0) continue;
-        const std::vector<std::uint32_t> faces = touching_faces(i);
+        const std::vector<std::uint32_t>& faces = touching_faces(i);
         if (body.radius == 0) {
             std::vector<Side> sides;
             for (const std::uint32_t f : faces) {

@@ -1,5 +1,5 @@
 // The one training set that takes seconds to make.
-#include "learn/training_data.hpp"
+#include "training_data.hpp"
 
 namespace ricochet::studies::training_data_full_test {
 namespace {

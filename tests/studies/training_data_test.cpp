@@ -1,5 +1,5 @@
 // ricochet-training-data, and the sets that it writes.
-#include "learn/training_data.hpp"
+#include "training_data.hpp"
 
 #include <algorithm>
 #include <filesystem>
