@@ -64,13 +64,3 @@ function(ricochet_small_sources)
     endforeach()
 endfunction()
 cmake_language(DEFER CALL ricochet_small_sources)
-
-# Mechanisms with contacts are not in Python, and the solvers of their sizes take long to compile.
-function(ricochet_unused_parts)
-    if(TARGET ricochet_fixed_sizes)
-        get_target_property(sources ricochet_fixed_sizes SOURCES)
-        list(REMOVE_ITEM sources contacts_2.cpp contacts_3.cpp)
-        set_target_properties(ricochet_fixed_sizes PROPERTIES SOURCES "${sources}")
-    endif()
-endfunction()
-cmake_language(DEFER CALL ricochet_unused_parts)

@@ -27,6 +27,7 @@ _LATER = {
                   "monodromy", "sensitivities"),
     "_guard_network": ("GuardNetwork",),
     "_inclusion": ("Inclusion",),
+    "_mechanism": ("Mechanism", "contact_motion"),
     "_monitor": ("Cut", "Monitor", "Verdict"),
     "_network": ("Network",),
     "_plot": ("plot",),
@@ -41,11 +42,10 @@ globals().update(_READY)  # BouncingBall and the other ready systems
 __all__ = [
     "Adjoint", "Animation", "C_FLOW", "C_GUARD", "C_JACOBIAN", "C_RATE", "C_RESET", "Certified",
     "Compiled", "Cut", "Ensemble", "Filippov", "Fmu", "FmuRun", "Gradient", "Guard", "GuardNetwork",
-    "Inclusion", "Kind", "Monitor", "Network", "OdeResult", "Perceptron", "Run", "Scene",
-    "SceneKind", "SceneRun", "Simulation", "Snapshot", "Solution", "Stop", "System", "Times",
-    "Trained", "Verdict", "adjoint", "animate", "certify", "ensemble", "every",
-    "find_periodic_orbit", "gradient", "guard", "integrate", "load_fmu",
-    "monodromy", "plot", "row_seed", "sensitivities", "solve_ivp", "train_classifier", "train_gate",
+    "Inclusion", "Kind", "Mechanism", "Monitor", "Network", "OdeResult", "Perceptron", "Run",
+    "Scene", "SceneKind", "SceneRun", "Simulation", "Snapshot", "Solution", "Stop", "System",
+    "Times", "Trained", "Verdict", "adjoint", "animate", "certify", "contact_motion", "ensemble",
+    "every", "find_periodic_orbit", "gradient", "guard", "integrate", "load_fmu", "monodromy", "plot", "row_seed", "sensitivities", "solve_ivp", "train_classifier", "train_gate",
     *_READY,
 ]
 

@@ -85,6 +85,8 @@ class Run:
     def reaction(self) -> _Floats: ...
     @property
     def reactions(self) -> _Floats: ...
+    @property
+    def contact(self) -> Optional[SimpleNamespace]: ...
 
 class Snapshot:
     @property
@@ -171,6 +173,31 @@ class Filippov(System):
                  **members: Any) -> None: ...
     def start_mode(self, t: float, x: ArrayLike, tolerance: float = 0.0) -> str: ...
     def shares(self, mode: str, t: float, x: ArrayLike) -> _Floats: ...
+
+class Mechanism(System):
+    contacts: int
+    tangents: int
+    mass: Any
+    force: Any
+    gaps: Any
+    directions: Any
+    surface_rates: Any
+    restitution: ArrayLike
+    friction: ArrayLike
+    dry_friction: Optional[ArrayLike]
+    def __init__(self, guards: Optional[Sequence[Any]] = None, **members: Any) -> None: ...
+
+def contact_motion(mechanism: Mechanism, q: ArrayLike, v: ArrayLike, t_end: float, *,
+                   step: float = 0.0, events_only: bool = False, rtol: float = 1e-10,
+                   atol: ArrayLike = 1e-12, t_start: float = 0.0, mode: Any = ...,
+                   method: str = "dopri5", fixed: bool = False, h_min: float = 0.0,
+                   h_max: float = ..., event_tolerance: float = 0.0, event_rtol: float = 0.0,
+                   event_window: float = 0.0, check_inside: bool = True,
+                   stop_at_event: bool = False, record_events: bool = True,
+                   event_states: bool = True, record_steps: bool = False,
+                   sample_times: Optional[ArrayLike] = None, detector: str = "extremum",
+                   locator: str = "newton", max_steps: int = ..., stall_steps: int = ...,
+                   progress: Union[None, bool, Callable[[float, float], Any]] = None) -> Run: ...
 
 class Ensemble:
     rows: NDArray[Any]

@@ -155,8 +155,8 @@ class _Recording:
     @staticmethod
     def _refuse(system):
         for name in ("guard_values", "reset_set", "next_time_event", "set_valued",
-                     "changes_dimension"):
-            if getattr(system, name):
+                     "changes_dimension", "contacts", "fields"):
+            if getattr(system, name, None):
                 raise ValueError(f"{name}: found it in a system whose gradient is asked for, "
                                  "expected one without; see docs/derivatives.md")
 

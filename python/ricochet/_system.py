@@ -247,16 +247,16 @@ def _plain_guard(function, index):
 
 
 @lru_cache(maxsize=1024)  # every run asks for the attributes of its instance
-def _known_name_near(name, is_method):
+def _known_name_near(name, is_method, further):
     if not is_method and name.removesuffix("s") in _KNOWN:
         return []  # names of components, a count of resets
     from difflib import get_close_matches
     # A parameter may be called ``low`` or ``model``.
-    return get_close_matches(name.lower(), _KNOWN, 1, 0.8 if is_method else 0.86)
+    return get_close_matches(name.lower(), _KNOWN + further, 1, 0.8 if is_method else 0.86)
 
 
 def _refuse_near_name(cls, name, is_method):
-    meant = _known_name_near(name, is_method)
+    meant = _known_name_near(name, is_method, cls._further_names)
     if meant:
         what = "a method" if is_method else "an attribute"
         raise TypeError(f"{cls.__name__}: found {what} {name!r}, expected {meant[0]!r}; if it means "
@@ -361,6 +361,7 @@ class System:
     jacobian = None
     vector = "array"
     _unchecked_names = False
+    _further_names = ()  #: of members that a subclass of this module adds
 
     def __init__(self, flow=None, guards=None, **members):
         if flow is not None:
@@ -368,9 +369,9 @@ class System:
         if guards is not None:
             self.guards = guards
         for name, value in members.items():
-            if name not in _KNOWN:
+            if name not in _KNOWN and name not in self._further_names:
                 raise TypeError(f"System: found a member {name!r}, expected some of "
-                                + meant_by(name, _KNOWN))
+                                + meant_by(name, _KNOWN + self._further_names))
             setattr(self, name, value)
 
     def __init_subclass__(cls, unchecked_names=False, **options):
@@ -381,7 +382,8 @@ class System:
         for name, member in vars(cls).items():
             if name.startswith("_") or name in _KNOWN or isinstance(member, Guard):
                 continue
-            _refuse_near_name(cls, name, callable(member))
+            if name not in cls._further_names:
+                _refuse_near_name(cls, name, callable(member))
 
     def _mode_list(self):
         modes = self._read_again("modes")
@@ -408,7 +410,8 @@ class System:
         """Rejects guards and resets that no run would use."""
         who = type(self).__name__
         for name, member in vars(self).items():
-            if name not in _KNOWN and not name.startswith("_") and not self._unchecked_names:
+            known = name in _KNOWN or name in self._further_names
+            if not known and not name.startswith("_") and not self._unchecked_names:
                 _refuse_near_name(type(self), name, False)
             if name in found:
                 raise TypeError(f"{who}: found an attribute {name!r} of an instance in place of a "
@@ -581,18 +584,8 @@ class System:
             raise TypeError(f"{type(self).__name__}: found flow({found}) in a system {why}, expected "
                             f"flow({mode}t, x{more})")
 
-    def _source(self, args=None, watch=None):
-        """The C++ object; ``watch(flow, is_moded)`` may put a function around the flow."""
-        may_keep = self.formula is not None and not args and watch is None
-        found = self._kept_run() if may_keep else None
-        if found is not None and _ricochet.unchanged(found[0]):
-            return found[1]
-        flow = as_function(self.flow, C_FLOW, "flow")
-        if not callable(flow) and not isinstance(flow, Compiled):
-            raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
-        if self.vector not in ("array", "list"):
-            raise ValueError(f"vector: found {self.vector!r}, expected 'array' or 'list'")
-        self._refuse_arguments(args)
+    def _event_members(self, args):
+        """What the C++ object reads of guards, times and modes."""
         following, preceding = self.next_time_event, self.previous_time_event
         times = None
         if self.time_events is not None:
@@ -613,7 +606,25 @@ class System:
                              "guards=[Guard(name=...), ...]")
         if not guards and self.reset_set is not None:
             raise ValueError("reset_set: found it without guards, expected some, or a time_reset")
-        time_reset = self.time_reset
+        return dict(name=self.name or type(self).__name__, modes=self._mode_list(), guards=guards,
+                    guard_values=self.guard_values, reset_set=self.reset_set, time_events=times,
+                    next_time_event=None if at else following,
+                    next_time_event_at=following if at else None, previous_time_event=preceding)
+
+    def _source(self, args=None, watch=None):
+        """The C++ object; ``watch(flow, is_moded)`` may put a function around the flow."""
+        may_keep = self.formula is not None and not args and watch is None
+        found = self._kept_run() if may_keep else None
+        if found is not None and _ricochet.unchanged(found[0]):
+            return found[1]
+        flow = as_function(self.flow, C_FLOW, "flow")
+        if not callable(flow) and not isinstance(flow, Compiled):
+            raise TypeError(f"{type(self).__name__}: found no flow, expected flow(t, x)")
+        if self.vector not in ("array", "list"):
+            raise ValueError(f"vector: found {self.vector!r}, expected 'array' or 'list'")
+        self._refuse_arguments(args)
+        events = self._event_members(args)
+        guards, time_reset = events["guards"], self.time_reset
         if self.formula is not None:
             for name in ("_kept", "_kept_resets", "_kept_source"):
                 vars(self).setdefault(name, Kept())
@@ -627,11 +638,7 @@ class System:
         if watch is not None:
             flow = watch(flow, self.modes is not None)
         source = _ricochet.callback_system(dict(
-            name=self.name or type(self).__name__, flow=flow, args=args,
-            modes=self._mode_list(), guards=guards,
-            guard_values=self.guard_values, reset_set=self.reset_set,
-            time_events=times, next_time_event=None if at else following,
-            next_time_event_at=following if at else None, previous_time_event=preceding,
+            events, flow=flow, args=args,
             time_reset=as_function(time_reset, C_RESET, "time_reset"),
             changes_dimension=self.changes_dimension, as_list=self.vector == "list",
             jacobian=as_function(self.jacobian, C_JACOBIAN, "jacobian"),

@@ -220,6 +220,12 @@ bool ContactPhases<C>::take(StepState<C>& step, double h)
         step.w_rate1[i] = step.error[i] = 0;
     });
     if constexpr (!is_small<C>) step.large.remainder1 = step.zero;
+    if (!setup_.keeps_rounding) return true;
+    for_each_component(step.x1, [&](auto i) {
+        const TwoSum sum = two_sum(step.x0[i], h * step.rate0[i] + (step.w[i] + step.remainder[i]));
+        step.x1[i] = sum.value;
+        if constexpr (!is_small<C>) step.large.remainder1[i] = sum.remainder;
+    });
     return true;
 }
 

@@ -2,9 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "ricochet/nonsmooth/contact_motion.hpp"
 #include "ricochet/systems/two_contact_block.hpp"
@@ -283,6 +285,64 @@ TEST(ContactMotion, RefusesAStartInsideAnObstacle)
     EXPECT_THROW((void)hand_over(Ball{}, {0, -0.1}, {0, 0}, {.t_end = 1}), std::invalid_argument);
     EXPECT_THROW((void)hand_over(Ball{.mu = -1}, {0, 1}, {0, 0}, {.t_end = 1}),
                  std::invalid_argument);
+}
+
+/// The puck of docs/contact.md, kicked every second, with a wall at 1 m.
+struct Puck : Ball {
+    static void mass(const V&, Eigen::Matrix2d& m) { m = Eigen::Vector2d(0.16, 0.16).asDiagonal(); }
+    static void force(double, const V&, const V&, V& f) { f << 0, -9.81 * 0.16; }
+};
+struct Kicked : Puck {
+    using State = std::array<double, 4>;
+    static double guard(double, const State& x) { return 1 - x[0]; }
+    static void reset(double, State& x) { x[2] = -x[2]; }
+    static double next_time_event(double t) { return std::floor(t) + 1; }
+    static void time_reset(double, State& x) { x[2] += 1; }
+};
+/// Three coordinates, two contacts in space, a mass matrix that changes.
+struct Plate {
+    static constexpr int coordinates = 3, contacts = 2, tangents = 2;
+    using V = Eigen::Vector3d;
+    static void mass(const V& q, Eigen::Matrix3d& m)
+    {
+        m << 2, 0.1 + 0.01 * q[0], 0.2, 0.1 + 0.01 * q[0], 1, 0.05, 0.2, 0.05, 3;
+    }
+    static void force(double t, const V& q, const V& v, V& f)
+    {
+        f << 0.3 * t - 0.2 * q[0], -9.81 - v[1], 0.1 * q[1] - 0.5 * v[2];
+    }
+    static void gaps(const V& q, Eigen::Vector2d& g) { g << q[1], q[1] + 0.1 * q[2] + 0.3; }
+    static void directions(const V&, Eigen::Matrix<double, 6, 3>& h)
+    {
+        h << 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0.1, 1, 0, 0.5, 0, 0, 1;
+    }
+    static double restitution(int c) { return c == 0 ? 0.6 : 0.4; }
+    static double friction(int c) { return c == 0 ? 0.3 : 0.1; }
+};
+
+/// Compares the sum of the times of all events, and the end.
+template <class Run>
+void expect_bits(const Run& run, std::size_t events, double times, const std::vector<double>& end)
+{
+    ASSERT_EQ(run.events.size(), events);
+    double sum = 0;
+    for (const auto& event : run.events) sum += event.t;
+    EXPECT_EQ(sum, times);
+    for (std::size_t i = 0; i < end.size(); ++i) EXPECT_EQ(run.x[i], end[i]) << i;
+}
+
+TEST(ContactMotion, RunsHaveTheBitsThatTheyHaveInPython)
+{
+    // The same numbers are in tests/python/mechanism_test.py, whose states are vectors.
+    expect_bits(hand_over(Puck{}, {0, 0.1}, {3, 0}, {.t_end = 4, .set_valued = {.step = 1e-4}}), 49,
+                0x1.46b0c509219bep+4, {0x1.282352e041aebp+1, -0x1.18e40f7a0f3fep-24, 0, 0});
+    expect_bits(hand_over(Kicked{}, {0, 0}, {2, 0}, {.t_end = 4}), 8, 0x1.1405c80e94586p+4,
+                {0x1.90f6a6dddc912p-1, -0x1.b6d024264562bp-14, 1, -0x1p-58});
+    expect_bits(hand_over(Plate{}, {0.1, 0.5, 0.2}, {1, 0, -0.3},
+                          {.t_end = 3, .set_valued = {.step = 1e-3}}),
+                66, 0x1.18560054bf007p+6,
+                {0x1.2e62d9b65e23fp-1, -0x1.9e741c58933fbp-18, 0x1.64d0fdcc01427p-4, -0x1p-63,
+                 -0x1p-59, 0});
 }
 
 }  // namespace

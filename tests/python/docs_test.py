@@ -16,7 +16,7 @@ from ricochet import _ricochet
 SOURCE = Path(os.environ.get("RICOCHET_SOURCE", Path(__file__).parents[2]))
 
 
-@pytest.mark.parametrize("page, least", [("README.md", 1), ("docs/clocks.md", 1), ("docs/phases.md", 1), ("docs/python.md", 4), ("docs/python-systems.md", 5),
+@pytest.mark.parametrize("page, least", [("README.md", 1), ("docs/clocks.md", 1), ("docs/phases.md", 1), ("docs/contact.md", 1), ("docs/python.md", 4), ("docs/python-systems.md", 5),
                                          ("docs/python-ensembles.md", 5), ("docs/python-more.md", 4),
                                          ("docs/fmi.md", 1), ("docs/derivatives.md", 5), ("docs/learned-guards.md", 1), ("python/README.md", 1)])
 def test_blocks_of_the_page_run(page, least, tmp_path, monkeypatch):

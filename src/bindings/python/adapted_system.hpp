@@ -47,7 +47,7 @@ public:
     AdaptedSystem(const Source& source, const State& like)
         : source_(&source), adapter_(source.open(like)), table_(&adapter_->table())
     {
-        if (adapter_->has_inclusion()) {
+        if (adapter_->has_inclusion() || adapter_->has_contacts()) {
             throw std::invalid_argument(
                 "set_valued: found set-valued motion, expected none: a network cannot learn from "
                 "it");

@@ -60,7 +60,7 @@ public:
             return true;
         }
         const Ref result = call(function, mode, t, x_.show(x));
-        read_square(result.get(), source_.jacobian_title_, x.size(), rows.data());
+        read_matrix(result.get(), source_.jacobian_title_, {x.size(), x.size()}, rows.data());
         return true;
     }
 

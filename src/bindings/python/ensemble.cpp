@@ -62,9 +62,9 @@ Record run_loop(const Request& request, const Source& source, const State& x0)
 {
     const std::unique_ptr<RunAdapter> adapter = source.open_for(request, x0);
     const OwnedSetup owned = setup_for(request, source, *adapter);
-    const auto loop = detail::make_loop(owned.setup, x0, request.options);
+    const RunLoop loop(request, owned, *adapter, x0);
     loop->run_to_end();
-    return with_counts(record_of(loop->finish()), *adapter);
+    return loop.record(loop->finish(), *adapter);
 }
 
 Record run_row(const Request& request, const Source& source, std::span<const double> start)

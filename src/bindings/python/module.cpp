@@ -19,6 +19,7 @@
 #include "filippov.hpp"
 #include "formula.hpp"
 #include "formula_series.hpp"
+#include "mechanism.hpp"
 #include "ready.hpp"
 #include "ricochet/nn/model.hpp"
 #include "source.hpp"
@@ -188,6 +189,13 @@ PYBIND11_MODULE(_ricochet, module)
         }))
         .def("start_mode_at", &FilippovSource::start_mode_at)
         .def("shares", &FilippovSource::shares);
+#ifdef RICOCHET_WITH_NONSMOOTH
+    module.def("mechanism_system",
+               [](const std::shared_ptr<Source>& beside,
+                  const py::dict& specification) -> std::shared_ptr<Source> {
+                   return std::make_shared<MechanismSource>(beside, specification.ptr());
+               });
+#endif
     using Formulas = std::vector<
         std::pair<std::vector<std::tuple<std::string, std::size_t, std::size_t, double>>,
                   std::vector<std::size_t>>>;

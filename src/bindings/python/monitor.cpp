@@ -110,10 +110,12 @@ public:
         start_mode_ = source_->start_mode();
         components_ = like.size();
         adapter_ = source_->open(like);
-        if (adapter_->has_inclusion()) {
-            throw std::invalid_argument(
-                "Monitor: found a system with set_valued, which a monitor cannot follow, expected "
-                "integrate or Simulation");
+        if (adapter_->has_inclusion() || adapter_->has_contacts()) {
+            const char* found =
+                adapter_->has_contacts() ? "a mechanism" : "a system with set_valued";
+            throw std::invalid_argument(std::string("Monitor: found ") + found +
+                                        ", which a monitor cannot follow, expected integrate or "
+                                        "Simulation");
         }
         // Guards see whole states: a host's interpolant need be no polynomial.
         table_ = adapter_->table();

@@ -180,15 +180,16 @@ void Numbers::read_objects(const Ref& array)
     size_ = converted_.size();
 }
 
-void read_square(PyObject* result, const std::string& who, std::size_t n, double* rows)
+void read_matrix(PyObject* result, const std::string& who, const std::array<std::size_t, 2>& shape,
+                 double* rows)
 {
     require_numpy();
     Ref given = Ref::share(result);
     if (PyObject_HasAttrString(result, "toarray")) {
         given = checked(PyObject_CallMethod(result, "toarray", nullptr));
     }
-    const std::string expected =
-        ", expected an array of shape (" + std::to_string(n) + ", " + std::to_string(n) + ")";
+    const std::string expected = ", expected an array of shape (" + std::to_string(shape[0]) +
+                                 ", " + std::to_string(shape[1]) + ")";
     const Ref any = given.get() == Py_None
                         ? Ref()
                         : Ref::take(PyArray_FromAny(given.get(), nullptr, 0, 0, 0, nullptr));
@@ -205,17 +206,18 @@ void read_square(PyObject* result, const std::string& who, std::size_t n, double
         raise(PyExc_TypeError, who + " returned a " + type_of(result) + expected);
     }
     array = reinterpret_cast<PyArrayObject*>(numbers.get());
-    const auto count = static_cast<npy_intp>(n);
-    const bool is_square = PyArray_NDIM(array) == 2 && PyArray_DIM(array, 0) == count &&
-                           PyArray_DIM(array, 1) == count;
+    const bool fits = PyArray_NDIM(array) == 2 &&
+                      PyArray_DIM(array, 0) == static_cast<npy_intp>(shape[0]) &&
+                      PyArray_DIM(array, 1) == static_cast<npy_intp>(shape[1]);
     // Of one component a number is enough, as for SciPy's LSODA.
-    if (!is_square && !(n == 1 && PyArray_SIZE(array) == 1)) {
-        const Ref shape = checked(PyObject_GetAttrString(numbers.get(), "shape"));
-        const Ref text = checked(PyObject_Str(shape.get()));
+    const std::size_t count = shape[0] * shape[1];
+    if (!fits && !(count == 1 && PyArray_SIZE(array) == 1)) {
+        const Ref found = checked(PyObject_GetAttrString(numbers.get(), "shape"));
+        const Ref text = checked(PyObject_Str(found.get()));
         raise(PyExc_ValueError,
               who + " returned the shape " + PyUnicode_AsUTF8(text.get()) + expected);
     }
-    std::memcpy(rows, PyArray_DATA(array), n * n * sizeof(double));
+    std::memcpy(rows, PyArray_DATA(array), count * sizeof(double));
 }
 
 PyObject* ShownArray::show_list(const State& x)

@@ -3,6 +3,7 @@
 
 #include "python_error.hpp"
 
+#include <array>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -49,10 +50,11 @@ private:
     Ref kept_;
 };
 
-/// Writes a matrix of n x n numbers that a callback has returned, row by row; a sparse one of SciPy
-/// is filled up.
+/// Writes a matrix of `shape` that a callback has returned, row by row; a sparse one of SciPy is
+/// filled up.
 /// @throws PythonError naming `who` returned something else
-void read_square(PyObject* result, const std::string& who, std::size_t n, double* rows);
+void read_matrix(PyObject* result, const std::string& who, const std::array<std::size_t, 2>& shape,
+                 double* rows);
 
 /// An array, or a list of floats, that is passed to callbacks. If a callback has kept it, the next
 /// call gets another one, so that the kept one does not change.

@@ -121,6 +121,10 @@ void set(Request& request, const py::handle& value)
              static const std::vector<std::string_view> known{"newton", "bisection", "toms748"};
              request.locator = one_of(read_as<std::string>(value), known);
          }},
+        {"events_only",
+         [](Request& request, const py::handle& value) {
+             request.events_only = read_as<bool>(value);
+         }},
         {"record_steps",
          [](Request& request, const py::handle& value) {
              request.record_steps = read_as<bool>(value);

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,16 @@ struct EventHead {
 };
 static_assert(sizeof(EventHead) == 64);
 
+/// What a run with contacts did in contact, see `ContactStatistics` and `ContactReport`.
+struct ContactCounts {
+    std::uint64_t steps = 0, problems = 0, iterations = 0, sweeps = 0, unsolved = 0;
+    std::uint64_t to_contact = 0, to_flight = 0;
+    double time = 0;      ///< [s]
+    bool failed = false;  ///< the run ended where a contact problem was not solved:
+    int contact = -1;
+    double residual = 0;
+};
+
 struct Record {
     Outcome outcome = Outcome::reached_end;
     double t = 0;
@@ -54,8 +65,9 @@ struct Record {
     std::vector<std::size_t> armed_on_surface;  ///< and those of them that began on it
     std::vector<MotionPhase> phases;            ///< of a system with set-valued motion
     std::vector<double> reaction;
-    std::size_t reaction_width = 0;  ///< number of reactions in the widest row
-    std::vector<double> reactions;   ///< row after row of that width, one for each of `times`
+    std::size_t reaction_width = 0;        ///< number of reactions in the widest row
+    std::vector<double> reactions;         ///< row after row of that width, one for each of `times`
+    std::optional<ContactCounts> contact;  ///< of a mechanism
 
     [[nodiscard]] std::size_t event_stride() const noexcept
     {

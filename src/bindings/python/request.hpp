@@ -25,6 +25,7 @@ struct Request {
     std::shared_ptr<const Model> gate{};  ///< the network of a detector that uses one
     bool record_steps = false;            ///< keep the state at the end of every step
     bool dense = false;                   ///< keep every step as a polynomial
+    bool events_only = false;             ///< a mechanism's run ends where contact would begin
     const double* parameters = nullptr;   ///< of formulas, for as long as the run
 
     /// Whether all choices are the defaults, so that a loop compiled for the system can be used.

@@ -98,6 +98,46 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     return space(**counts);
 }
 
+[[nodiscard]] py::object contact_of(const Record& record)
+{
+    if (!record.contact) return py::none();
+    static const auto& space =
+        *new py::object(py::module_::import("types").attr("SimpleNamespace"));
+    using namespace py::literals;
+    const ContactCounts& c = *record.contact;
+    py::object failure = py::none();
+    if (c.failed) failure = space("contact"_a = c.contact, "residual"_a = c.residual);
+    return space("steps"_a = c.steps, "problems"_a = c.problems, "iterations"_a = c.iterations,
+                 "sweeps"_a = c.sweeps, "unsolved"_a = c.unsolved, "to_contact"_a = c.to_contact,
+                 "to_flight"_a = c.to_flight, "time"_a = c.time, "failure"_a = failure);
+}
+
+[[nodiscard]] py::object pickled(const std::optional<ContactCounts>& counts)
+{
+    if (!counts) return py::none();
+    const ContactCounts& c = *counts;
+    return py::make_tuple(c.steps, c.problems, c.iterations, c.sweeps, c.unsolved, c.to_contact,
+                          c.to_flight, c.time, c.failed, c.contact, c.residual);
+}
+
+[[nodiscard]] std::optional<ContactCounts> contact_from(const py::object& state)
+{
+    if (state.is_none()) return std::nullopt;
+    const py::tuple of = py::cast<py::tuple>(state);
+    const auto count = [&](std::size_t i) { return py::cast<std::uint64_t>(of[i]); };
+    return ContactCounts{.steps = count(0),
+                         .problems = count(1),
+                         .iterations = count(2),
+                         .sweeps = count(3),
+                         .unsolved = count(4),
+                         .to_contact = count(5),
+                         .to_flight = count(6),
+                         .time = py::cast<double>(of[7]),
+                         .failed = py::cast<bool>(of[8]),
+                         .contact = py::cast<int>(of[9]),
+                         .residual = py::cast<double>(of[10])};
+}
+
 [[nodiscard]] py::bytes bytes_of(const std::vector<double>& numbers)
 {
     return py::bytes(reinterpret_cast<const char*>(numbers.data()),
@@ -162,12 +202,12 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
         r.solution ? py::object(pickled(PySolution{r.solution})) : py::object(py::none()),
         self.modes, self.guard_names, r.reason, r.armed_beyond, pickled(r.phases),
         bytes_of(r.reaction), bytes_of(r.reactions), r.armed_on_surface, r.jacobians,
-        r.factorizations);
+        r.factorizations, pickled(r.contact));
 }
 
 [[nodiscard]] PyRun run_from(const py::tuple& state)
 {
-    if (state.size() != 24) throw py::value_error("found a pickle of another version");
+    if (state.size() != 25) throw py::value_error("found a pickle of another version");
     PyRun out;
     Record& r = out.record;
     r.outcome = static_cast<Outcome>(py::cast<int>(state[0]));
@@ -202,6 +242,7 @@ using Counts = std::array<std::uint64_t, sizeof(Statistics) / sizeof(std::uint64
     r.armed_on_surface = py::cast<std::vector<std::size_t>>(state[21]);
     r.jacobians = py::cast<std::uint64_t>(state[22]);
     r.factorizations = py::cast<std::uint64_t>(state[23]);
+    r.contact = contact_from(state[24]);
     if (!r.times.empty()) r.reaction_width = r.reactions.size() / r.times.size();
     return out;
 }
@@ -298,7 +339,9 @@ namespace {
     const auto add = [&](bool on_surface, std::string_view before) {
         for (const std::size_t which : r.armed_beyond) {
             if (std::binary_search(on.begin(), on.end(), which) != on_surface) continue;
-            out += std::string(std::exchange(before, ", ")) + self.guard_names.at(which);
+            const bool named = which < self.guard_names.size();
+            out += std::string(std::exchange(before, ", ")) +
+                   (named ? self.guard_names[which] : "a velocity under dry friction");
         }
     };
     add(false,
@@ -424,7 +467,13 @@ void bind_reactions(RunClass& run)
     run.def_property_readonly(
            "phases", [](const PyRun& self) { return listed(self.record.phases); },
            "Of a system with set_valued: tuples of the time from which a phase lasts, whether "
-           "something is held or followed by implicit steps in it, and why it began.")
+           "something is held or followed by implicit steps in it, and why it began. Of a "
+           "mechanism: whether it is in contact.")
+        .def_property_readonly(
+            "contact", [](const PyRun& self) { return contact_of(self.record); },
+            "Of a mechanism: counts of its motion in contact (steps, problems, iterations, sweeps, "
+            "unsolved, to_contact, to_flight), its time [s], and failure: None, or the contact and "
+            "the residual of the problem that was not solved.")
         .def_property_readonly(
             "reaction",
             [](const py::object& self) {
@@ -433,7 +482,9 @@ void bind_reactions(RunClass& run)
                                self);
             },
             "Of a system with set_valued: the reactions at the end, after its events; empty where "
-            "the mode has no inclusion, NaN where none follows from the state.")
+            "the mode has no inclusion, NaN where none follows from the state. Of a mechanism: the "
+            "forces [N] of the contacts, the normal one of each first, and of dry friction of each "
+            "coordinate, means over the last step.")
         .def_property_readonly(
             "reactions",
             [](const py::object& self) {

@@ -64,26 +64,63 @@ void detect_without_gate(detail::RunBindings<State>& setup, const Request& reque
     }
 }
 
+/// Refuses what no run with phases has. @param what  makes it one
+void check_phases(const Request& request, const std::string& what, bool may_be_fixed)
+{
+    const bool named = !request.by_series && !request.implicit;
+    const bool fits = named && (request.fixed ? may_be_fixed : estimates_error(request.method));
+    if (!fits) {
+        throw std::invalid_argument(
+            what +
+            (may_be_fixed ? ": found 'taylor' or 'rosenbrock4' beside it, expected "
+                          : ": found fixed steps, 'taylor' or 'rosenbrock4' beside it, "
+                            "expected ") +
+            detail::spelled_methods(true, "'") + " with error control");
+    }
+    if (detail::detector_place(request.detector) == detail::NamedDetectors::size) {
+        refuse("detector", request.detector, detail::spelled_detectors("'") + " beside " + what);
+    }
+}
+
 }  // namespace
+
+std::vector<double> RunLoop::reaction() const
+{
+    return contact_ ? contact_->forces() : loop_->reaction();
+}
+
+Record RunLoop::record(Run<State>&& run, RunAdapter& adapter, const StepEnds<State>* steps) const
+{
+    if (!contact_) return with_counts(record_of(std::move(run), steps), adapter);
+    run.phases = contact_->phases();
+    run.reaction = contact_->forces();
+    const ContactCounts counts = contact_->counts(run);
+    Record out = with_counts(record_of(std::move(run), steps), adapter);
+    out.contact = counts;
+    return out;
+}
 
 RunLoop::RunLoop(const Request& request, const OwnedSetup& setup, RunAdapter& adapter,
                  const State& x0)
 {
+    if (adapter.has_contacts()) {
+        check_phases(request, "a mechanism", true);
+        contact_ = adapter.open_contacts(request, setup.setup, x0);
+        loop_ = &contact_->loop();
+        return;
+    }
+    if (request.events_only) {
+        throw std::invalid_argument(
+            "events_only: found one for a system without contacts, "
+            "expected a ricochet.Mechanism");
+    }
     if (!adapter.has_inclusion()) {
         own_ = detail::make_loop(setup.setup, x0, request.options);
         loop_ = own_.operator->();
         return;
     }
 #ifdef RICOCHET_WITH_NONSMOOTH
-    if (request.fixed || request.by_series || request.implicit ||
-        !estimates_error(request.method)) {
-        throw std::invalid_argument(
-            "set_valued: found fixed steps, 'taylor' or 'rosenbrock4' beside it, expected " +
-            detail::spelled_methods(true, "'") + " with error control");
-    }
-    if (detail::detector_place(request.detector) == detail::NamedDetectors::size) {
-        refuse("detector", request.detector, detail::spelled_detectors("'") + " beside set_valued");
-    }
+    check_phases(request, "set_valued", false);
     detail::PhasedSetup<State> phases;
     phases.user = setup.setup;
     phases.method = request.method;

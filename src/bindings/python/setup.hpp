@@ -34,9 +34,17 @@ public:
     [[nodiscard]] detail::AnyLoop<State>& operator*() const noexcept { return *loop_; }
     [[nodiscard]] detail::AnyLoop<State>* operator->() const noexcept { return loop_; }
 
+    [[nodiscard]] bool has_contacts() const noexcept { return contact_ != nullptr; }
+    /// Reactions after the last step; of a mechanism the forces in it.
+    [[nodiscard]] std::vector<double> reaction() const;
+    /// The record of a run of this loop.
+    [[nodiscard]] Record record(Run<State>&& run, RunAdapter& adapter,
+                                const StepEnds<State>* steps = nullptr) const;
+
 private:
     detail::Owner<detail::AnyLoop<State>> own_;
     detail::Owner<detail::PhasedRun<State>> phased_;
+    std::unique_ptr<ContactLoop> contact_;
     detail::AnyLoop<State>* loop_ = nullptr;
 };
 

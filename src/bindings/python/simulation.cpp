@@ -24,10 +24,26 @@ namespace {
 
 using Loop = detail::AnyLoop<State>;
 
+/// Runs a mechanism to its end; returns its forces at the sample times, those of the steps that
+/// hold them.
+[[nodiscard]] std::vector<std::vector<double>> forces_of(const RunLoop& loop)
+{
+    std::vector<std::vector<double>> rows;
+    const auto& samples = loop->run().trajectory.t;
+    const auto note = [&] {
+        if (rows.size() < samples.size()) rows.resize(samples.size(), loop.reaction());
+    };
+    note();
+    while (loop->step()) note();
+    note();
+    return rows;
+}
+
 /// Runs to the end. If `kept` is not null, appends the state at the end of every step to it, with
 /// both sides of every reset.
-void drive(Loop& loop, StepEnds<State>* kept)
+void drive(const RunLoop& of, StepEnds<State>* kept)
 {
+    Loop& loop = *of;
     if (!kept) {
         loop.run_to_end();
         return;
@@ -37,7 +53,9 @@ void drive(Loop& loop, StepEnds<State>* kept)
         if (x.empty() || (!steps.t.empty() && steps.t.back() == t && steps.x.back() == x)) {
             return;
         }
-        if (!loop.run().phases.empty()) kept->reactions.push_back(loop.reaction());
+        if (of.has_contacts() || !loop.run().phases.empty()) {
+            kept->reactions.push_back(of.reaction());
+        }
         steps.t.push_back(t);
         steps.x.push_back(x);
     };
@@ -137,15 +155,25 @@ PyRun run_of(const std::shared_ptr<Source>& source, const State& x0, Request&& r
     StepEnds<State> steps;
     StepEnds<State>* const kept = request.record_steps ? &steps : nullptr;
     RunLoop loop;
+    std::vector<std::vector<double>> forces;
+    const auto record = [&] {
+        Run<State> run = loop->finish();
+        forces.resize(loop.has_contacts() ? run.trajectory.t.size() : 0, loop.reaction());
+        if (!forces.empty()) run.reactions = std::move(forces);
+        return loop.record(std::move(run), *adapter, kept);
+    };
     try {
         loop = RunLoop(request, owned, *adapter, x0);
-        work_freely(adapter->is_free(), [&] { drive(*loop, kept); });
+        if (loop.has_contacts() && !kept) {
+            forces = forces_of(loop);
+        } else {
+            work_freely(adapter->is_free(), [&] { drive(loop, kept); });
+        }
     } catch (const PythonError& error) {
-        out.record = loop ? with_counts(record_of(loop->finish(), kept), *adapter)
-                          : start_of(x0, request.options);
+        out.record = loop ? record() : start_of(x0, request.options);
         raise_with(error, std::move(out));
     }
-    out.record = with_counts(record_of(loop->finish(), kept), *adapter);
+    out.record = record();
     if (adapter->watch().raised()) raise_with(*adapter->watch().raised(), std::move(out));
     return out;
 }
@@ -312,7 +340,7 @@ public:
         if (finished_) return array_of(finished_->record.reaction);
         std::vector<double> r;
         use([&] {
-            r = loop_->reaction();
+            r = loop_.reaction();
             return true;
         });
         return array_of(r);
@@ -391,9 +419,9 @@ private:
 
     [[nodiscard]] Record recorded(Run<State> run)
     {
-        if (!record_steps_) return with_counts(record_of(std::move(run)), *adapter_);
+        if (!record_steps_) return loop_.record(std::move(run), *adapter_);
         const StepEnds<State> steps = step_ends_of(run);
-        return with_counts(record_of(std::move(run), &steps), *adapter_);
+        return loop_.record(std::move(run), *adapter_, &steps);
     }
 
     [[noreturn]] void end_with(const PythonError& error)

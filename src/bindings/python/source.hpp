@@ -66,6 +66,21 @@ struct ImplicitCounts {
     std::uint64_t flow_calls = 0;  ///< for differences, which the loop does not count
 };
 
+/// The run of a mechanism with contacts.
+class ContactLoop {
+public:
+    ContactLoop() = default;
+    ContactLoop(const ContactLoop&) = delete;
+    ContactLoop& operator=(const ContactLoop&) = delete;
+    virtual ~ContactLoop() = default;
+
+    [[nodiscard]] virtual detail::AnyLoop<State>& loop() noexcept = 0;
+    /// Of the last step: those of the contacts, then dry friction of each coordinate.
+    [[nodiscard]] virtual std::vector<double> forces() const = 0;
+    [[nodiscard]] virtual const std::vector<MotionPhase>& phases() const noexcept = 0;
+    [[nodiscard]] virtual ContactCounts counts(const Run<State>& run) const = 0;
+};
+
 /// The adapter of one run to its system.
 class RunAdapter {
 public:
@@ -101,6 +116,17 @@ public:
                                 const Options& /*options*/)
     {
         throw std::logic_error("a adapter to a system without set-valued motion");
+    }
+
+    /// Whether the system is a mechanism with contacts.
+    [[nodiscard]] virtual bool has_contacts() const noexcept { return false; }
+    /// The run of such a system whose flight has this setup.
+    /// @throws std::invalid_argument for a start at which no mechanism begins
+    [[nodiscard]] virtual std::unique_ptr<ContactLoop> open_contacts(
+        const Request& /*request*/, const detail::RunBindings<State>& /*flight*/,
+        const State& /*x0*/)
+    {
+        throw std::logic_error("a adapter to a system without contacts");
     }
 
     [[nodiscard]] virtual SignalWatch& watch() noexcept { return *watch_; }

@@ -26,6 +26,9 @@ struct ContactSetup {
     std::size_t contacts = 0;        ///< the first guards are their gaps
     std::size_t event_guards = 0;    ///< those and the guards of the system
     std::size_t modes = 0;           ///< of the system; 0: not declared
+    /// Whether steps in contact keep the rounding of the state, as those of small states do; for
+    /// vectors that stand for small states.
+    bool keeps_rounding = is_small<C>;
 };
 
 /// A run of a mechanism.
