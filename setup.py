@@ -64,7 +64,7 @@ class CMakeBuild(build_ext):
         target.parent.mkdir(parents=True, exist_ok=True)
         self.copy_file(str(module), str(target))
         # Where a further part is in the module; FMUs are where what they need is there.
-        for part in ("_scenes", "_learn", "_gradients", "_fmi"):
+        for part in ("_scenes", "_learn", "_gradients", "_faults", "_fmi"):
             for further in (build / "python" / "ricochet").glob(f"{part}.*"):
                 self.copy_file(str(further), str(target.parent / further.name))
 

@@ -16,7 +16,7 @@ from ricochet import _ricochet
 SOURCE = Path(os.environ.get("RICOCHET_SOURCE", Path(__file__).parents[2]))
 
 
-@pytest.mark.parametrize("page, least", [("README.md", 1), ("docs/clocks.md", 1), ("docs/phases.md", 1), ("docs/contact.md", 1), ("docs/python.md", 4), ("docs/python-systems.md", 5),
+@pytest.mark.parametrize("page, least", [("README.md", 1), ("docs/clocks.md", 1), ("docs/phases.md", 1), ("docs/contact.md", 1), ("docs/fault.md", 1), ("docs/rate-and-state.md", 1), ("docs/python.md", 4), ("docs/python-systems.md", 5),
                                          ("docs/python-ensembles.md", 5), ("docs/python-more.md", 4),
                                          ("docs/fmi.md", 1), ("docs/derivatives.md", 5), ("docs/learned-guards.md", 1), ("python/README.md", 1)])
 def test_blocks_of_the_page_run(page, least, tmp_path, monkeypatch):
@@ -33,6 +33,8 @@ def test_blocks_of_the_page_run(page, least, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
     if page == "docs/derivatives.md" and not find_spec("ricochet._gradients"):
         pytest.skip("a build without gradients")
+    if page in ("docs/fault.md", "docs/rate-and-state.md") and not find_spec("ricochet._faults"):
+        pytest.skip("a build without faults")
     names = {}
     for block in blocks:
         for missing in ("numba", "cffi", "matplotlib", "scipy", "torch"):
@@ -49,6 +51,8 @@ def test_examples_draw_their_picture(script, tmp_path):
     pytest.importorskip("matplotlib")
     if "ricochet.sensitivities" in script.read_text() and not find_spec("ricochet._gradients"):
         pytest.skip("a build without gradients")
+    if "ricochet import faults" in script.read_text() and not find_spec("ricochet._faults"):
+        pytest.skip("a build without faults")
     picture = tmp_path / "picture.svg"
     subprocess.run([sys.executable, str(script), str(picture)], check=True, timeout=60)
     assert picture.stat().st_size > 5000
