@@ -221,7 +221,7 @@ def cells():
     out += [("balls", "ricochet", f"ensemble, formulas, {method}", tolerance, balls(method, tolerance))
             for method, tolerance in (("dopri5", 1e-10), ("taylor", 1e-10))]
     out += [("orbits", "ricochet", "ensemble, formulas, taylor", tolerance, orbits(tolerance))
-            for tolerance in (1e-9, 1e-13)]
+            for tolerance in (1e-9, 1e-13, LEAST)]
     out += [("gradient", "ricochet", "ready, adjoint, dopri5", 1e-10, gradient(1e-10)),
             ("gradient", "ricochet", "formulas, adjoint, dopri5", 1e-10, own_gradient(1e-10))]
     return out

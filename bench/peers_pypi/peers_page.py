@@ -17,7 +17,6 @@ PEERS_OF = {"peer_ricochet.py": ["ricochet"], "scenes_ricochet.py": ["ricochet"]
 PEERS = ["ricochet", "heyoka", "diffrax", "numbalsoda", "casadi", "scikit-sundae", "SciPy", "Drake", "torchdiffeq",
          "pymunk", "Box2D", "MuJoCo", "FMPy"]
 ENGINE = "an engine of bodies: no differential equations of one's own"
-MOTION = "integrates differential equations: contacts of a thousand bodies are half a million event functions"
 NO_RECORD = "events end its runs; driven for resets, not here for crossings that are only recorded"
 NO_MODES = "has no modes; driven here where one flow suffices"
 BY_HAND = "has no events of ensembles; a loop over single runs, whose time stands above"
@@ -42,11 +41,14 @@ CANNOT = {
     "fmu-ball": {"casadi": "imports FMUs (`DaeBuilder`), and warns that events are experimental; not driven here",
                  "SciPy": FMU, "heyoka": FMU, "diffrax": FMU},
 }
+# Where these alone have a place; elsewhere all of them.
+PLACES = {"discs": ("pymunk", "Box2D", "MuJoCo"), "spinning-disc": ("pymunk", "Box2D", "MuJoCo"),
+          "fmu-ball": ("FMPy", "casadi")}
 
 
 def cannot(problem, peer, absent):
     """Why `peer` has no row, or nothing where there is nothing to say."""
-    if peer in absent:
+    if peer in absent and peer in PLACES.get(problem, PEERS):
         return absent[peer]
     return CANNOT.get(problem, {}).get(peer, "")
 
