@@ -2,6 +2,7 @@
 
 import ctypes
 import gc
+import math
 import os
 import random
 import shutil
@@ -296,3 +297,47 @@ def test_threads_have_code_in_common_and_the_memory_is_given_back():
             ends(1.0 + 0.01 * i)
         gc.collect()
         assert mappings() <= before + 3
+
+
+@pytest.mark.parametrize("of", range(COUNT // 4))
+def test_rates_are_derivatives_along_the_flow(of):
+    formula = Random(of)
+    guard = formula.formula([formula.guard])
+    dxdt = [0.3 * (i + 1) - 0.7 for i in range(formula.components)]
+
+    def value(s):
+        x = [a + s * b for a, b in zip(formula.x, dxdt)]
+        return guard.values(formula.t + s, x, 1, False)[0]
+
+    rate = guard.rate().values(formula.t, formula.x + dxdt, 1, False)[0]
+    # Differences over two lengths: where they agree the formula is smooth, and their error is a third of
+    # their distance, besides rounding, 1e-16 of the largest intermediate result over the length.
+    h = 1e-4
+    near, far = ((value(s) - value(-s)) / (2 * s) for s in (h / 2, h))
+    if not (math.isfinite(near) and abs(near) < 1e3 and abs(near - far) < 1e-5):
+        pytest.skip("no smooth formula here")
+    if not math.isfinite(rate):
+        pytest.skip("an operation at the edge of its domain, such as hypot(0, 0): a run takes a difference")
+    assert abs(rate - near) <= 2 * abs(near - far) + 1e-7 * (1 + abs(near))
+
+
+def test_rates_of_every_operation():
+    # Of each f(a(t), b(t)) with a = x0, b = x1 at a point inside all domains, by complex steps where NumPy has them.
+    ops = [("component", 0, 0, 0.0), ("component", 1, 0, 0.0)]
+    x, dxdt = [0.4, 0.7], [0.9, -0.6]
+    two = {"add": lambda a, b: a + b, "subtract": lambda a, b: a - b, "multiply": lambda a, b: a * b,
+           "divide": lambda a, b: a / b, "power": lambda a, b: a ** b,
+           "atan2": lambda a, b: np.arctan(a / b), "hypot": lambda a, b: np.sqrt(a * a + b * b)}
+    one = {"negate": lambda a: -a, "cbrt": lambda a: a ** (1 / 3), "asin": np.arcsin, "acos": np.arccos,
+           "atan": np.arctan, **{name: getattr(np, name) for name in (
+               "sqrt", "exp", "log", "sin", "cos", "tan", "sinh", "cosh", "tanh")}}
+    assert set(two) == set(TWO) and set(one) == set(ONE)
+    a, b = (complex(value, 1e-30 * slope) for value, slope in zip(x, dxdt))
+    for name, function in (*two.items(), *one.items()):
+        binary = name in two
+        formula = _ricochet.Formula(2, [(ops + [(name, 0, 1 if binary else 0, 0.0)], [2])])
+        expected = (function(a, b) if binary else function(a)).imag * 1e30
+        rate = formula.rate()
+        for by_code in (False, True) if has_code() else (False,):
+            found = rate.values(0.0, x + dxdt, 1, by_code)[0]
+            assert abs(found - expected) <= 8e-16 * (1 + abs(expected)), name

@@ -417,7 +417,8 @@ def test_a_reset_that_changes_nothing_outside_is_called_for_its_formula_alone():
         x[0], x[1] = 0, -restitution * x[1]
         return x
 
-    expected = impacts(ricochet.System(fall, [ricochet.Guard(lambda t, x: x[0], reset=by_list)]))
+    expected = impacts(ricochet.System(fall, [ricochet.Guard(lambda t, x: x[0], reset=by_list,
+                                                             rate=lambda t, x, dxdt: dxdt[0])]))
     assert len(expected) == 4
     for reset in by_list, in_place:
         system = ball(reset, rest=lambda t, x: [0.0, 0.0])
@@ -520,6 +521,8 @@ def test_recorded_resets_change_modes_and_act_at_times():
 
     class Called(Thermostat):
         formula = None
+        too_cold = Thermostat.too_cold.rate(lambda self, mode, t, x, dxdt: dxdt[0])
+        too_warm = Thermostat.too_warm.rate(lambda self, mode, t, x, dxdt: -dxdt[0])
 
     system = Thermostat()
     run = ricochet.integrate(system, [20.0], 48.0, mode="off")
@@ -528,3 +531,21 @@ def test_recorded_resets_change_modes_and_act_at_times():
     assert run.mode == expected.mode and len(run.events) == len(expected.events) > 10
     assert np.array_equal(run.events["t"], expected.events["t"])
     assert np.array_equal(run.x, expected.x)
+
+
+def test_guards_of_formulas_need_no_more_calls_than_those_of_cpp():
+    ready = ricochet.integrate(ricochet.BouncingBall(gravity=9.81, restitution=0.9), [10.0, 0.0], 20.5)
+    own = ricochet.System(
+        lambda t, x: [x[1], -9.81], [ricochet.Guard(lambda t, x: x[0], unilateral=True,
+                                                    reset=lambda t, x: [0.0, -0.9 * x[1]])], formula=2)
+    for options in {}, dict(record_steps=True):  # the loop for small states, and the general one
+        run = ricochet.integrate(own, [10.0, 0.0], 20.5, **options)
+        assert run.statistics.guard_calls == ready.statistics.guard_calls
+        assert run.events["t"].tolist() == ready.events["t"].tolist()
+
+
+def test_a_rate_of_a_formula_that_is_infinite_is_a_difference():
+    fall = ricochet.System(lambda t, x: [x[1], -9.81], [ricochet.Guard(lambda t, x: np.cbrt(x[0]))], formula=2)
+    for options in {}, dict(record_steps=True):
+        run = ricochet.integrate(fall, [2.0, 0.0], 1.0, **options)
+        assert abs(run.events["t"][0] - np.sqrt(4 / 9.81)) < 1e-12

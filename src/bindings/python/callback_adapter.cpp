@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <stdexcept>
@@ -95,8 +96,9 @@ private:
     template <class Member>
     [[nodiscard]] static bool every(const Guards& guards, Member member)
     {
-        return std::all_of(guards.begin(), guards.end(),
-                           [&](const CallbackGuard& guard) { return bool(guard.*member); });
+        return std::all_of(guards.begin(), guards.end(), [&](const CallbackGuard& guard) {
+            return bool(std::invoke(member, guard));
+        });
     }
 
     // --- parts of the table ---
@@ -142,7 +144,7 @@ private:
     {
         table.guarded = true;
         table.guard_alone = !source.guard_values_;
-        table.rated = every(source.guards_, &CallbackGuard::rate);
+        table.rated = every(source.guards_, &CallbackGuard::is_rated);
         table.calls_of_rate = table.rated ? 0 : 2;
         table.info = [](void* adapter, std::size_t which) {
             return at(adapter).source_.guards_[which].info;
@@ -339,6 +341,9 @@ private:
                                      const State& dxdt)
     {
         const CallbackGuard& guard = source_.guards_[which];
+        if (guard.derived) {
+            return guard.derived->value_along(mode, t, x.data(), dxdt.data(), parameters_);
+        }
         if (guard.rate.address) {
             return reinterpret_cast<CompiledRate>(guard.rate.address)(
                 mode, t, x.data(), dxdt.data(), x.size(), guard.rate.user);
@@ -353,7 +358,7 @@ private:
                               const State& dxdt)
     {
         const double t = time.t;
-        if (source_.guards_[of.which].rate) {
+        if (source_.guards_[of.which].is_rated()) {
             const double known = of.backward
                                      ? -closed_rate(of.which, of.mode, t, x, detail::negated(dxdt))
                                      : closed_rate(of.which, of.mode, t, x, dxdt);

@@ -238,6 +238,9 @@ void CallbackSource::read_guard(PyObject* specification)
     }
     guard.value = Function(item(specification, "value").get(), guard.title);
     guard.rate = function("rate");
+    if (!guard.rate && guard.value.formula && !truth_in(specification, "boolean")) {
+        guard.derived = std::make_shared<const ModedFormula>(guard.value.formula->rate());
+    }
     guard.reset = function("reset");
     guard.rest = function("rest");
     guard.enabled = function("enabled");

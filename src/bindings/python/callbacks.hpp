@@ -80,7 +80,11 @@ struct CallbackGuard {
     GuardInfo info;
     Function value, rate, reset, rest, enabled;
     Function speed_bound, acceleration_bound, lower_bound, upper_bound;
+    std::shared_ptr<const ModedFormula> derived;  ///< the rate of a formula, where none is given
     double lipschitz = 1;
+
+    [[nodiscard]] bool is_rated() const noexcept { return rate || derived; }
+
     bool directed = false;      ///< the reset takes the direction of the crossing
     std::vector<bool> in_mode;  ///< empty: in every mode
 };

@@ -1,5 +1,6 @@
 #include "formula.hpp"
 
+#include "formula_rate.hpp"
 #include "formula_series.hpp"
 #include "ricochet/taylor/detail/taylor_adapter.hpp"
 
@@ -70,6 +71,32 @@ void Formula::interpret(double t, const double* x, const double* parameters, dou
     constexpr std::uint32_t enough = 300;
     code_->count(enough, [&] { return code(); });
     evaluate(t, x, parameters, out, scratch());
+}
+
+Formula Formula::rate() const
+{
+    FormulaRate of(components_, ops_);
+    const std::size_t result = of.derivative(outputs_.front());
+    auto [ops, output] = of.only(result);
+    return {2 * components_, parameters_, std::move(ops), {output}};
+}
+
+ModedFormula ModedFormula::rate() const
+{
+    ModedFormula out;
+    for (const Formula& formula : by_mode) out.by_mode.push_back(formula.rate());
+    return out;
+}
+
+double ModedFormula::value_along(std::uint32_t mode, double t, const double* x, const double* dxdt,
+                                 const double* parameters) const
+{
+    thread_local std::vector<double> both;
+    const std::size_t n = in(mode).components() / 2;
+    both.resize(2 * n);
+    std::copy_n(x, n, both.begin());
+    std::copy_n(dxdt, n, both.begin() + static_cast<std::ptrdiff_t>(n));
+    return value(mode, t, both.data(), parameters);
 }
 
 std::size_t ModedFormula::parameters() const noexcept

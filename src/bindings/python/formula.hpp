@@ -8,6 +8,7 @@
 #include <memory>
 #include <string>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "formula_code.hpp"
@@ -62,6 +63,10 @@ public:
         interpret(t, x, parameters, out);
     }
 
+    /// The derivative of the first output along x' = dxdt: a formula of twice as many components,
+    /// x and then dxdt.
+    [[nodiscard]] Formula rate() const;
+
     /// Code for `compute`, or nothing.
     [[nodiscard]] MachineCode code() const noexcept { return code_of_values(ops_, outputs_); }
 
@@ -76,6 +81,16 @@ public:
     }
 
 private:
+    Formula(std::size_t components, std::size_t parameters, std::vector<FormulaOp> ops,
+            std::vector<std::size_t> outputs)
+        : components_(components),
+          parameters_(parameters),
+          ops_(std::move(ops)),
+          outputs_(std::move(outputs)),
+          code_(std::make_unique<LateCode<ValuesCode>>())
+    {
+    }
+
     /// By the interpreter, and makes the code when there have been enough.
     void interpret(double t, const double* x, const double* parameters, double* out) const;
     template <class S, class Xs>
@@ -110,6 +125,11 @@ struct ModedFormula {
     /// As a guard.
     [[nodiscard]] double value(std::uint32_t mode, double t, const double* x,
                                const double* parameters) const;
+    /// The rate of a guard, see `Formula::rate`.
+    [[nodiscard]] ModedFormula rate() const;
+    /// As such a rate.
+    [[nodiscard]] double value_along(std::uint32_t mode, double t, const double* x,
+                                     const double* dxdt, const double* parameters) const;
     /// As a reset: x⁻ becomes x⁺; returns the next mode.
     [[nodiscard]] std::uint32_t edit(std::uint32_t mode, double t, double* x,
                                      const double* parameters) const;

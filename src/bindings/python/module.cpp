@@ -212,6 +212,8 @@ PYBIND11_MODULE(_ricochet, module)
              py::arg("following") = std::vector<std::uint32_t>())
         .def("values", &values_of, py::arg("t"), py::arg("x"), py::arg("count"), py::arg("by_code"),
              py::arg("parameters") = Numbers())
+        .def("rate",
+             [](const ModedFormula& self) { return std::make_shared<ModedFormula>(self.rate()); })
         .def("series", &series_of)
         .def("time_to_make_series", &time_to_make_series);
     bind_guard_network(module);

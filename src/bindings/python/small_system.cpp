@@ -2,11 +2,13 @@
 // its states in registers and on the stack. Their bits are those of the loop for vectors.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <exception>
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -99,6 +101,7 @@ public:
             table.rest = nullptr;
         }
         add_times(table);
+        if (std::ranges::all_of(guards, &CallbackGuard::is_rated)) add_rates(table);
         return table;
     }
 
@@ -116,6 +119,40 @@ private:
         if (!function) return mode;
         const Mode next = function.edit(mode, t, x.data(), components_, parameters_);
         return source_->moded_ ? next : mode;
+    }
+    /// The rate of a formula with respect to the time itself.
+    [[nodiscard]] double derived(std::size_t which, Mode mode, double t, const State& x,
+                                 const State& dxdt) const
+    {
+        if (!enabled(which, mode)) return 0;
+        return guard(which).derived->value_along(mode, t, x.data(), dxdt.data(), parameters_);
+    }
+    [[nodiscard]] static double rate(void* adapter, GuardInMode of, detail::ScaledTime time,
+                                     const State& x, const State& dxdt)
+    {
+        const SmallSystem& system = at(adapter);
+        const double known = of.backward ? -system.derived(of.which, of.mode, time.t, x,
+                                                           detail::negated(State(dxdt)))
+                                         : system.derived(of.which, of.mode, time.t, x, dxdt);
+        if (std::isfinite(known)) return known;
+        return detail::system_table<SmallSystem, State>.rate(adapter, of, time, x, dxdt);
+    }
+    static void add_rates(Table& table)
+    {
+        table.rated = true;
+        table.calls_of_rate = 0;
+        table.rate = &rate;
+        table.point = [](void* adapter, GuardInMode of, detail::ScaledTime time, const State& x,
+                         const State& dxdt) -> detail::GuardPoint {
+            return {at(adapter).guard(of.which, of.mode, time.t, x),
+                    rate(adapter, of, time, x, dxdt)};
+        };
+        table.each_rate = [](void* adapter, const detail::Along<State>& motion,
+                             std::span<double> rates) {
+            for (std::size_t i = 0; i < rates.size(); ++i) {
+                rates[i] = at(adapter).derived(i, motion.mode, motion.t, motion.x, motion.s);
+            }
+        };
     }
     void add_times(Table& table) const
     {
