@@ -75,6 +75,12 @@ void set(Request& request, const py::handle& value)
     request.options.*member = read_as<T>(value);
 }
 
+template <bool Request::*flag>
+void set_flag(Request& request, const py::handle& value)
+{
+    request.*flag = read_as<bool>(value);
+}
+
 [[nodiscard]] const std::map<std::string, Setter, std::less<>>& setters()
 {
     static const std::map<std::string, Setter, std::less<>> all{
@@ -106,8 +112,7 @@ void set(Request& request, const py::handle& value)
              request.implicit = name == "rosenbrock4";
              if (!request.by_series && !request.implicit) request.method = method_of(name);
          }},
-        {"fixed",
-         [](Request& request, const py::handle& value) { request.fixed = read_as<bool>(value); }},
+        {"fixed", &set_flag<&Request::fixed>},
         {"detector",
          [](Request& request, const py::handle& value) {
              request.detector = one_of(read_as<std::string>(value), known_detectors());
@@ -121,14 +126,8 @@ void set(Request& request, const py::handle& value)
              static const std::vector<std::string_view> known{"newton", "bisection", "toms748"};
              request.locator = one_of(read_as<std::string>(value), known);
          }},
-        {"events_only",
-         [](Request& request, const py::handle& value) {
-             request.events_only = read_as<bool>(value);
-         }},
-        {"record_steps",
-         [](Request& request, const py::handle& value) {
-             request.record_steps = read_as<bool>(value);
-         }},
+        {"events_only", &set_flag<&Request::events_only>},
+        {"record_steps", &set_flag<&Request::record_steps>},
         {"dense",
          [](Request& request, const py::handle& value) {
              request.dense = request.options.record_steps = read_as<bool>(value);
