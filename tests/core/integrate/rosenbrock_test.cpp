@@ -419,6 +419,34 @@ TEST(Rosenbrock, TransientsShorterThanAStepHaveNoEventsOfTheirOwn)
 }
 
 // There and back, each way with an error of some rtol; the turning points are reached again.
+/// x'' = -x.
+struct Turning {
+    using State = std::array<double, 2>;
+    template <class X>
+    void flow(const ScalarOf<X>& /*t*/, const X& x, X& dxdt) const
+    {
+        dxdt[0] = x[1];
+        dxdt[1] = -x[0];
+    }
+};
+
+TEST(Rosenbrock, StepsWhoseCubesUnderflowAreTaken)
+{
+    // The first step is as short as the tolerance of the component that starts at zero: down to
+    // 1e-190 s. The motion is (cos t, -sin t), by a relative tolerance of 1e-8 of each of some
+    // hundred steps.
+    for (const double size : {1.0, 1e100, 1e120, 1e150, 1e290}) {
+        for (const double atol : {1e-10, 1e-200}) {
+            const auto run =
+                integrate(Turning{}, {size, 0},
+                          {.t_end = 1, .rtol = 1e-8, .atol = atol}, Stiff{});
+            ASSERT_EQ(run.outcome, Outcome::reached_end) << size << ", " << atol;
+            EXPECT_NEAR(run.x[0] / size, std::cos(1.0), 1e-6) << size << ", " << atol;
+            EXPECT_NEAR(run.x[1] / size, -std::sin(1.0), 1e-6) << size << ", " << atol;
+        }
+    }
+}
+
 TEST(Rosenbrock, RunsBackward)
 {
     const Options options{.t_end = 5, .rtol = 1e-9, .atol = 1e-11};
