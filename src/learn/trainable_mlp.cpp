@@ -1,35 +1,139 @@
 #include "trainable_mlp.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
+
+#include "base/wide.hpp"
 
 namespace ricochet::learn {
 
 namespace {
 
-// States are processed in blocks: a block of one row stays in registers while
-// the other index runs, and its lanes never mix except in `sum`.
+// States are processed in blocks of 8 lanes, which never mix except in `sum_of`. Several rows are
+// computed together, so that what is loaded serves all of them; the order of every sum is that of
+// one row alone, and products are rounded before they are added, in both versions of a kernel.
 constexpr std::size_t block = 8;
-using Block = std::array<double, block>;
+constexpr std::size_t together = 4;
+typedef double Half __attribute__((vector_size(32), may_alias, aligned(8)));
 
-Block load_block(const double* from)
+[[gnu::always_inline]] inline const Half& half_at(const double* from)
 {
-    Block values;
-    std::copy_n(from, block, values.begin());
-    return values;
+    return *reinterpret_cast<const Half*>(from);
 }
 
-void add_product(Block& sum, double factor, const double* values)
+[[gnu::always_inline]] inline Half& half_at(double* to)
 {
-    for (std::size_t lane = 0; lane < block; ++lane) sum[lane] += factor * values[lane];
+    return *reinterpret_cast<Half*>(to);
 }
 
-double sum(const Block& b)
+/// A matrix by which rows of lanes are multiplied: element (row, column) is at
+/// row * row_stride + column * column_stride.
+struct Matrix {
+    const double* elements;
+    std::size_t row_stride;
+    std::size_t column_stride;
+    std::size_t columns;
+
+    [[nodiscard]] double at(std::size_t row, std::size_t column) const
+    {
+        return elements[row * row_stride + column * column_stride];
+    }
+};
+
+/// `Rows` rows of start + matrix * in, from `row` on, for the block of lanes at `s`.
+template <std::size_t Rows>
+[[gnu::always_inline]] inline void multiply_rows(const Matrix& matrix, const double* start,
+                                                 std::size_t row, const double* in,
+                                                 std::size_t lanes, double* out)
 {
-    return ((b[0] + b[4]) + (b[2] + b[6])) + ((b[1] + b[5]) + (b[3] + b[7]));
+    for (std::size_t s = 0; s < lanes; s += block) {
+        Half low[Rows]{};
+        Half high[Rows]{};
+        for (std::size_t r = 0; start != nullptr && r < Rows; ++r) {
+            const double first = start[row + r];
+            low[r] = Half{first, first, first, first};
+            high[r] = low[r];
+        }
+        for (std::size_t c = 0; c < matrix.columns; ++c) {
+            const Half& in_low = half_at(in + c * lanes + s);
+            const Half& in_high = half_at(in + c * lanes + s + 4);
+            for (std::size_t r = 0; r < Rows; ++r) {
+                const double w = matrix.at(row + r, c);
+                low[r] += w * in_low;
+                high[r] += w * in_high;
+            }
+        }
+        for (std::size_t r = 0; r < Rows; ++r) {
+            half_at(out + (row + r) * lanes + s) = low[r];
+            half_at(out + (row + r) * lanes + s + 4) = high[r];
+        }
+    }
+}
+
+/// out = start + matrix * in, for `rows` rows of `lanes` lanes; `start` may be null.
+RICOCHET_WIDE void multiply(const Matrix& matrix, const double* start, std::size_t rows,
+                            const double* in, std::size_t lanes, double* out)
+{
+    std::size_t row = 0;
+    for (; row + together <= rows; row += together) {
+        multiply_rows<together>(matrix, start, row, in, lanes, out);
+    }
+    for (; row < rows; ++row) multiply_rows<1>(matrix, start, row, in, lanes, out);
+}
+
+[[gnu::always_inline]] inline double sum_of(const Half& low, const Half& high)
+{
+    return ((low[0] + high[0]) + (low[2] + high[2])) + ((low[1] + high[1]) + (low[3] + high[3]));
+}
+
+/// Dot products of one row of slopes with `Rows` rows of values.
+template <std::size_t Rows>
+[[gnu::always_inline]] inline void dot_rows(const double* slope, const double* values,
+                                            std::size_t lanes, double* out)
+{
+    Half low[Rows]{};
+    Half high[Rows]{};
+    for (std::size_t s = 0; s < lanes; s += block) {
+        const Half& slope_low = half_at(slope + s);
+        const Half& slope_high = half_at(slope + s + 4);
+        for (std::size_t r = 0; r < Rows; ++r) {
+            low[r] += slope_low * half_at(values + r * lanes + s);
+            high[r] += slope_high * half_at(values + r * lanes + s + 4);
+        }
+    }
+    for (std::size_t r = 0; r < Rows; ++r) out[r] = sum_of(low[r], high[r]);
+}
+
+/// out = slopes * values^T, `rows` x `columns`, sums over the lanes.
+RICOCHET_WIDE void outer(const double* slopes, std::size_t rows, const double* values,
+                         std::size_t columns, std::size_t lanes, double* out)
+{
+    for (std::size_t row = 0; row < rows; ++row) {
+        std::size_t c = 0;
+        double* const to = out + row * columns;
+        for (; c + together <= columns; c += together) {
+            dot_rows<together>(slopes + row * lanes, values + c * lanes, lanes, to + c);
+        }
+        for (; c < columns; ++c) {
+            dot_rows<1>(slopes + row * lanes, values + c * lanes, lanes, to + c);
+        }
+    }
+}
+
+/// out = slopes * 1, sums over the lanes.
+void sum_rows(const double* slopes, std::size_t rows, std::size_t lanes, double* out)
+{
+    for (std::size_t row = 0; row < rows; ++row) {
+        Half low{};
+        Half high{};
+        for (std::size_t s = 0; s < lanes; s += block) {
+            low += half_at(slopes + row * lanes + s);
+            high += half_at(slopes + row * lanes + s + 4);
+        }
+        out[row] = sum_of(low, high);
+    }
 }
 
 // Evaluations of many states are done in pieces that stay in the cache.
@@ -92,24 +196,13 @@ void TrainableMlp::forward()
 {
     for (std::size_t k = 0; k < shapes_.size(); ++k) {
         const Shape& shape = shapes_[k];
-        const bool last = k + 1 == shapes_.size();
-        const double* const in = activations_[k].data();
-        for (std::size_t o = 0; o < shape.outputs; ++o) {
-            const double* const weight = parameters_.data() + shape.weight + o * shape.inputs;
-            double* const out = activations_[k + 1].data() + o * lanes_;
-            for (std::size_t s = 0; s < lanes_; s += block) {
-                Block z;
-                z.fill(parameters_[shape.bias + o]);
-                for (std::size_t i = 0; i < shape.inputs; ++i) {
-                    add_product(z, weight[i], in + i * lanes_ + s);
-                }
-                if (!last && activation_ == Activation::relu) {
-                    for (double& value : z) value = value > 0 ? value : 0;
-                } else if (!last) {
-                    for (double& value : z) value = std::tanh(value);
-                }
-                std::copy(z.begin(), z.end(), out + s);
-            }
+        std::vector<double>& out = activations_[k + 1];
+        multiply({parameters_.data() + shape.weight, shape.inputs, 1, shape.inputs},
+                 parameters_.data() + shape.bias, shape.outputs, activations_[k].data(), lanes_,
+                 out.data());
+        if (k + 1 == shapes_.size()) return;
+        for (double& value : out) {
+            value = activation_ == Activation::relu ? (value > 0 ? value : 0) : std::tanh(value);
         }
     }
 }
@@ -118,42 +211,18 @@ void TrainableMlp::backward(std::span<double> gradient)
 {
     for (std::size_t k = shapes_.size(); k-- > 0;) {
         const Shape& shape = shapes_[k];
-        const double* const in = activations_[k].data();
+        const std::vector<double>& in = activations_[k];
         const double* const slope = slopes_[k + 1].data();
-        for (std::size_t o = 0; o < shape.outputs; ++o) {
-            const double* const row = slope + o * lanes_;
-            Block bias{};
-            for (std::size_t s = 0; s < lanes_; s += block) add_product(bias, 1, row + s);
-            gradient[shape.bias + o] = sum(bias);
-            for (std::size_t i = 0; i < shape.inputs; ++i) {
-                Block weight{};
-                for (std::size_t s = 0; s < lanes_; s += block) {
-                    const Block slopes = load_block(row + s);
-                    const double* const values = in + i * lanes_ + s;
-                    for (std::size_t lane = 0; lane < block; ++lane) {
-                        weight[lane] += slopes[lane] * values[lane];
-                    }
-                }
-                gradient[shape.weight + o * shape.inputs + i] = sum(weight);
-            }
-        }
+        sum_rows(slope, shape.outputs, lanes_, gradient.data() + shape.bias);
+        outer(slope, shape.outputs, in.data(), shape.inputs, lanes_,
+              gradient.data() + shape.weight);
         if (k == 0) return;
-        for (std::size_t i = 0; i < shape.inputs; ++i) {
-            const double* const values = in + i * lanes_;
-            double* const out = slopes_[k].data() + i * lanes_;
-            for (std::size_t s = 0; s < lanes_; s += block) {
-                Block back{};
-                for (std::size_t o = 0; o < shape.outputs; ++o) {
-                    const double weight = parameters_[shape.weight + o * shape.inputs + i];
-                    add_product(back, weight, slope + o * lanes_ + s);
-                }
-                for (std::size_t lane = 0; lane < block; ++lane) {
-                    const double y = values[s + lane];
-                    const double rate =
-                        activation_ == Activation::tanh ? 1 - y * y : (y > 0 ? 1.0 : 0.0);
-                    out[s + lane] = back[lane] * rate;
-                }
-            }
+        std::vector<double>& out = slopes_[k];
+        multiply({parameters_.data() + shape.weight, 1, shape.inputs, shape.outputs}, nullptr,
+                 shape.inputs, slope, lanes_, out.data());
+        for (std::size_t j = 0; j < out.size(); ++j) {
+            const double y = in[j];
+            out[j] *= activation_ == Activation::tanh ? 1 - y * y : (y > 0 ? 1.0 : 0.0);
         }
     }
 }
