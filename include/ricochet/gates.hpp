@@ -210,6 +210,8 @@ namespace detail {
 void check_gate_kind(const gates::Gate& gate, bool horizon);
 /// @throws std::invalid_argument because no step would be kept.
 void check_longest_interval(std::size_t steps);
+/// Steps of the longest horizon of a gate for fixed steps, at least 256 and at most 65 536.
+[[nodiscard]] std::size_t longest_horizon(const gates::Gate& gate) noexcept;
 
 /// A detector that holds a gate.
 template <class Base>
@@ -250,11 +252,13 @@ public:
     static constexpr bool needs_bounds = false;
     static constexpr Evidence deferred = Evidence::gated;
 
-    /// @param longest_interval  largest number of steps without a check; as many starts are kept
+    /// @param longest_interval  largest number of steps without a check, by default those of the
+    ///        longest horizon; as many starts are kept
     /// @throws std::invalid_argument for a level gate, or if `longest_interval` is 0.
-    explicit Calibrated(gates::Gate gate, std::size_t longest_interval = 256,
+    explicit Calibrated(gates::Gate gate, std::optional<std::size_t> longest_interval = {},
                         const Exact& exact = {})
-        : Base(std::move(gate), true, exact), longest_(longest_interval)
+        : Base(std::move(gate), true, exact),
+          longest_(longest_interval.value_or(detail::longest_horizon(this->gate())))
     {
         detail::check_longest_interval(longest_);
     }

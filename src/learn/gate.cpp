@@ -314,6 +314,7 @@ private:
     /// Sorts states into the classes from which batches are made.
     void sort_out()
     {
+        if (options_.logarithmic) return sort_by_octave();
         fatal_.clear();
         near_.clear();
         clear_.clear();
@@ -329,6 +330,31 @@ private:
             critical_states_.insert(critical_states_.end(), row,
                                     row + static_cast<std::ptrdiff_t>(training_.width));
         }
+    }
+
+    /// States by the shortest horizon that contains their event, or none, and those of weight 0.
+    void sort_by_octave()
+    {
+        octaves_.assign(options_.levels.size() + 2, {});
+        for (std::size_t i = 0; i < training_.size(); ++i) {
+            const auto k = std::lower_bound(options_.levels.begin(), options_.levels.end(),
+                                            training_.event[i]) -
+                           options_.levels.begin();
+            const std::size_t pool =
+                training_.weight[i] == 0 ? options_.levels.size() + 1 : static_cast<std::size_t>(k);
+            octaves_[pool].push_back(i);
+        }
+    }
+
+    [[nodiscard]] std::size_t draw_by_octave()
+    {
+        const std::size_t horizons = options_.levels.size();
+        const double u = random_.uniform();
+        std::size_t pool = random_.below(horizons);
+        if (u < 0.4) pool = horizons;
+        if (u >= 0.2 && u < 0.8 && !octaves_[horizons + 1].empty()) pool = horizons + 1;
+        while (octaves_[pool].empty()) pool = (pool + 1) % octaves_.size();
+        return octaves_[pool][random_.below(octaves_[pool].size())];
     }
 
     /// The training states that a threshold must not clear, at one level or another.
@@ -352,7 +378,7 @@ private:
         batch_.resize(options_.batch * width);
         drawn_.resize(options_.batch);
         for (std::size_t s = 0; s < options_.batch; ++s) {
-            drawn_[s] = draw();
+            drawn_[s] = options_.logarithmic ? draw_by_octave() : draw();
             std::copy_n(training_states_.begin() + static_cast<std::ptrdiff_t>(drawn_[s] * width),
                         width, batch_.begin() + static_cast<std::ptrdiff_t>(s * width));
         }
@@ -435,6 +461,7 @@ private:
     /// are in `logits_`.
     [[nodiscard]] Choice choose()
     {
+        if (options_.logarithmic) return choose_by_quantile();
         std::vector<double> lowest(options_.levels.size(), infinity);
         for (std::size_t i = 0; i < validation_.size(); ++i) {
             lower(validation_, i, logits_.data() + i * outputs(), lowest);
@@ -456,6 +483,24 @@ private:
             if (choice.cost < best.cost) best = std::move(choice);
         }
         return best;
+    }
+
+    /// Logits below which one in a thousand of the fatal states lies; a calibration shifts them.
+    [[nodiscard]] Choice choose_by_quantile()
+    {
+        Choice choice;
+        for (std::size_t k = 0; k < options_.levels.size(); ++k) {
+            std::vector<double> fatal;
+            for (std::size_t i = 0; i < validation_.size(); ++i) {
+                if (validation_.back[i] > options_.levels[k]) continue;
+                fatal.push_back(logits_[i * outputs() + k]);
+            }
+            const auto at = fatal.begin() + static_cast<std::ptrdiff_t>(fatal.size() / 1000);
+            std::nth_element(fatal.begin(), at, fatal.end());
+            choice.thresholds.push_back(at == fatal.end() ? -never : *at);
+        }
+        choice.cost = cost(choice.thresholds);
+        return choice;
     }
 
     /// Lowers the lowest logit of states that must not be cleared, for each level, by state i.
@@ -511,6 +556,7 @@ private:
     std::vector<double> offset_, scale_;
     std::vector<double> training_states_, validation_states_;
     std::vector<std::size_t> fatal_, near_, clear_;
+    std::vector<std::vector<std::size_t>> octaves_;  ///< pools of states, where sampling is so
     std::vector<double> batch_, logits_, critical_states_, critical_logits_;
     std::vector<std::size_t> drawn_;
     std::vector<double> best_, thresholds_;

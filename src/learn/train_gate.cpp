@@ -124,6 +124,13 @@ std::string to_json(const GateReport& report)
                                {"fatal_states", report.fatal_states},
                                {"events", report.events},
                                {"expected_looks_per_step", report.looks},
+                               {"guard_calls", report.guard_calls},
+                               {"calibration",
+                                {{"events", report.calibration.events},
+                                 {"misses", report.calibration.misses},
+                                 {"miss_bound", report.calibration.miss_bound()},
+                                 {"checks_per_event", report.calibration.checks_per_event},
+                                 {"shift", report.calibration.shift}}},
                                {"trial",
                                 {{"events", t.events},
                                  {"misses", t.misses},
@@ -135,7 +142,7 @@ std::string to_json(const GateReport& report)
                                  {"network_calls", t.network_calls},
                                  {"outside", t.outside},
                                  {"repeated_steps", t.repeated},
-                                 {"verdict", describe(t.rivals)}}}};
+                                 {"verdict", report.describe()}}}};
     return out.dump(2);
 }
 

@@ -105,7 +105,7 @@ constexpr std::string_view by_evolution =
 constexpr std::string_view by_reward =
     "reinforcement learning, from rewards along runs that its own steps make";
 
-constexpr std::array<ModelData, 19> all{{
+constexpr std::array<ModelData, 20> all{{
     {"ageing-friction", "histories of slip rate and friction, make_friction_data", friction_set},
     {"bouncing-ball", of_ball, ball_set<BallModel::any_step>},
     {"bouncing-ball-step-0.01", of_ball, ball_set<BallModel::fixed_step>},
@@ -125,6 +125,8 @@ constexpr std::array<ModelData, 19> all{{
      gate_set<ImpactOscillator, GateStepping::adaptive>},
     {"pendulum-gate", of_gate, gate_set<Pendulum, GateStepping::fixed>},
     {"pendulum-gate-adaptive", of_gate, gate_set<Pendulum, GateStepping::adaptive>},
+    {"posts-gate", "states of runs, those of a later round chosen by the network of the last",
+     nullptr},
     {"sliding-mode-step", by_evolution, nullptr},
     {"sliding-mode-tqc", by_reward, nullptr},
     {"stick-slip-gate", of_gate, gate_set<StickSlip, GateStepping::fixed>},

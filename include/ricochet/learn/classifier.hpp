@@ -247,6 +247,13 @@ struct GateTraining {
     std::size_t validation_events = 1000;  ///< number of events that choose weights and thresholds
     std::size_t fresh_events = 30'000;     ///< to measure the miss rate; 0: not measured
     std::size_t most_steps = 100'000'000;  ///< largest number in each of these sets of runs
+    /// Whether states are drawn by the logarithm of the time to their event, so that every horizon
+    /// is learned from as many states; for horizon gates that span more than a few octaves.
+    bool logarithmic = false;
+    /// Largest fraction of events that may be missed, with 95 % confidence; 0: as few as possible,
+    /// by thresholds that clear no state that is known to be fatal.
+    double miss_rate = 0;
+    std::size_t calibration_events = 0;  ///< that choose thresholds for `miss_rate`; 0: enough
 
     std::vector<std::size_t> hidden{16, 16};
     std::size_t iterations = 4000;  ///< iterations in a round
@@ -268,6 +275,45 @@ struct GateTraining {
     /// Read before every iteration; true stops the training, as the callback does. May be null.
     const std::atomic<bool>* cancelled = nullptr;
 };
+
+/// Purpose of a gate, for a trainer that chooses the rest: see `choose`. Horizon gates only.
+struct GateAim {
+    GateRecipe recipe{};
+    double step = 0;         ///< [s] fixed; not used with error control
+    double run_length = 10;  ///< [s] length of a run
+    double miss_rate =
+        2e-4;  ///< largest fraction of events that may be missed, with 95 % confidence
+    /// Price [s] of a call of the guard where the gate is to be used; 0: as measured here.
+    double guard_seconds = 0;
+    std::uint64_t seed = 1;
+
+    std::filesystem::path checkpoint{};  ///< as in `GateTraining`
+    bool resume = false;
+    const std::atomic<bool>* cancelled = nullptr;
+};
+
+/// First runs of a system, from which a training is chosen.
+struct GateSurvey {
+    double step = 0;                  ///< [s] fixed, or the mean
+    std::vector<double> intervals{};  ///< [steps] between events
+    std::vector<double>
+        dwells{};  ///< [steps] beyond the surface, if the flow goes on without reset
+    std::uint64_t guard_calls = 0;
+    double guard_seconds = 0;  ///< [s] of a call
+
+    [[nodiscard]] double interval() const;  ///< [steps] median between events
+    [[nodiscard]] double dwell() const;     ///< [steps] median beyond the surface
+};
+
+/// The training of a gate for this aim: horizons of 2, 4, 8, ... steps up to the median interval
+/// between events; three layers whose width is the largest of 16, 32 and 64 with which the network
+/// is no more expensive than the guard; states by the logarithm of the time to their event; as many
+/// events as the rate of misses demands. It depends on nothing but its arguments.
+/// @throws std::invalid_argument if the rate is not in (0, 0.1], or no interval was seen.
+[[nodiscard]] GateTraining choose(const GateAim& aim, const GateSurvey& survey);
+
+/// One sentence that says what was seen and chosen.
+[[nodiscard]] std::string describe(const GateSurvey& survey, const GateTraining& chosen);
 
 /// States of runs, with the events that followed them.
 struct GateSamples {
@@ -318,6 +364,16 @@ struct GateTrial {
     }
 };
 
+/// Choice of thresholds by their misses on runs that trained nothing.
+struct GateCalibration {
+    std::uint64_t events = 0;
+    std::uint64_t misses = 0;
+    double checks_per_event = 0;  ///< of the guard, without those inside the step of an event
+    double shift = 0;             ///< by which all thresholds were lowered
+
+    [[nodiscard]] double miss_bound() const;  ///< at 95 % confidence
+};
+
 /// Result and cost of a training of a gate.
 struct GateReport {
     TrainingOutcome outcome = TrainingOutcome::finished;
@@ -327,9 +383,21 @@ struct GateReport {
     std::size_t fatal_states = 0;     ///< of these, fatal
     std::uint64_t events = 0;         ///< in all runs before the trial
     double looks = 1;                 ///< exact checks per step, as estimated on the validation set
+    std::uint64_t guard_calls = 0;    ///< before the trial
+    double guard_seconds = 0;         ///< [s] of a call of the guard, as measured; 0: not known
+    double price = 0;                 ///< [s] of a call where the gate is to be used; 0: the same
+    GateCalibration calibration;      ///< without events: thresholds were not calibrated
     GateTrial trial;
     /// Reason why the last checkpoint could not be written; empty if it was, or there is none.
     std::string checkpoint_trouble{};
+
+    /// Says whether the network is the fastest of the ways that lose no more events, from which
+    /// price of a guard call on it is, and after how many steps it has saved the guard calls of its
+    /// training.
+    [[nodiscard]] std::string describe() const;
+
+    /// Adds the calls of a survey, and the prices of a call.
+    void add(const GateSurvey& survey, const GateAim& aim);
 };
 
 /// A trained gate and its report.
@@ -337,6 +405,9 @@ struct TrainedGate {
     Model model;
     GateReport report;
 };
+
+/// Result of a work that was stopped before anything was trained: no model.
+[[nodiscard]] TrainedGate interrupted_gate();
 
 /// Returns the report as the text of a JSON object.
 [[nodiscard]] std::string to_json(const GateReport& report);

@@ -23,23 +23,15 @@
 #include "ricochet/extremum.hpp"
 #include "ricochet/gates.hpp"
 #include "ricochet/learn/classifier.hpp"
+#include "ricochet/learn/detail/gate_labels.hpp"
+#include "ricochet/learn/detail/gate_walks.hpp"
 #include "ricochet/learn/detail/rivals.hpp"
+#include "ricochet/learn/detail/side_by_side.hpp"
 #include "ricochet/simulation.hpp"
 
 namespace ricochet::learn {
 
 namespace detail {
-
-/// The flow of a system in one mode, without its guards.
-template <class System, class X>
-struct FlowOnly {
-    const System* system;
-    Mode mode;
-    void flow(double t, const X& x, X& dxdt) const
-    {
-        ricochet::detail::call_flow(*system, mode, t, x, dxdt);
-    }
-};
 
 /// @throws std::invalid_argument: no run can be started.
 [[noreturn]] void throw_no_start(const std::string& why);
@@ -105,6 +97,34 @@ public:
                                .estimate = estimate});
     }
 
+    /// Runs that show how often events come, how long a guard stays beyond its surface, at most for
+    /// the longest horizon, and what a call of it costs.
+    [[nodiscard]] GateSurvey survey(std::size_t events, std::uint64_t seed)
+    {
+        Random random(seed);
+        GateSurvey seen;
+        GateSamples nowhere;
+        survey_ = &seen;
+        const std::uint64_t before = guard_calls_;
+        begin_stage("surveying", events);
+        while (nowhere.events < events && nowhere.steps < training_.most_steps && !stopped_) {
+            Exact run = start(random);
+            follow(run, {nowhere, 0, random});
+            if (nowhere.events == 0 && nowhere.steps > 2'000'000) break;  // there are none
+        }
+        survey_ = nullptr;
+        seen.guard_calls = guard_calls_ - before;
+        std::vector<RunStart<X>> states;
+        for (int i = 0; i < 64 && !stopped_; ++i) states.push_back(starts_(random));
+        const auto [seconds, calls] = detail::price_of_guard(*system_, states);
+        seen.guard_seconds = seconds;
+        guard_calls_ += calls;
+        return seen;
+    }
+
+    /// Calls of the guard so far, without those of `compare` and `rivals`.
+    [[nodiscard]] std::uint64_t guard_calls() const noexcept { return guard_calls_; }
+
     /// Samples states from runs with `events` events in total. Of the states without an event in
     /// reach, a fraction is kept that gives about `states` in total, each with its weight.
     [[nodiscard]] GateSamples sample(std::size_t events, std::size_t states, std::uint64_t seed)
@@ -120,6 +140,7 @@ public:
         begin_stage("sampling", events);
         while (out.events < events && out.steps < most && !stopped_) {
             Exact run = start(random);
+            if (walks_ != nullptr) walks_->restart();
             follow(run, {out, share, random});
             if (out.events == 0 && out.steps > 2'000'000) break;  // there are none
             // As many clear states are kept as there is room for.
@@ -134,6 +155,32 @@ public:
         if (out.events == 0 && training_.kind == GateKind::horizon && !stopped_) {
             detail::throw_no_events(out.steps);
         }
+        return out;
+    }
+
+    /// Counts checks and misses of the gate with each of these thresholds, on runs with `events`
+    /// events in total that are checked at every step.
+    void calibrate(detail::GateWalks& walks, std::size_t events, std::uint64_t seed)
+    {
+        Random random(seed);
+        GateSamples nowhere;
+        walks_ = &walks;
+        begin_stage("calibrating", events);
+        while (nowhere.events < events && nowhere.steps < training_.most_steps && !stopped_) {
+            walks.restart();
+            Exact run = start(random);
+            follow(run, {nowhere, 0, random});
+        }
+        walks_ = nullptr;
+    }
+
+    /// Samples states of new runs, and those at which the gate is asked along them, with weight 0.
+    [[nodiscard]] GateSamples sample_with(const Model& gate, std::size_t events, std::uint64_t seed)
+    {
+        detail::GateWalks walks(gate, {0.0});
+        walks_ = &walks;
+        GateSamples out = sample(events, training_.states, seed);
+        walks_ = nullptr;
         return out;
     }
 
@@ -188,38 +235,23 @@ public:
     [[nodiscard]] GateTrial compare(const Detector& detector, std::size_t events,
                                     std::uint64_t seed)
     {
-        using Gated = Simulation<System, X, Stepping, Detector>;
         Random random(seed);
         GateTrial trial;
         const double before = detail::processor_seconds();
         begin_stage("testing", events);
         while (trial.events < events && trial.steps < training_.most_steps &&
                goes_on(trial.events)) {
-            std::optional<Exact> exact(start(random));
-            Options options = options_used_;
-            std::optional<Gated> gated(std::in_place, *system_, exact->x(), options, Stepping{},
-                                       detector);
-            for (;;) {
-                const Agreement next = take_next_event(*exact, *gated, trial.events);
-                if (stopped_) break;
-                const bool ended = exact->ended();
-                const double t = exact->t();
-                const X x = exact->x();
-                const Mode mode = exact->mode();
-                if (next == Agreement::to_the_bit && !ended) continue;
-                finish(*exact, *gated, trial);
-                trial.misses += next == Agreement::none ? 1 : 0;
-                if (ended || trial.events >= events || !(options.t_end > t)) break;
-                options.t_start = t;
-                options.mode = mode;
-                if (!restart(exact, gated, x, options, detector)) break;
-            }
+            Exact exact = start(random);
+            detail::SideBySide<System, X, Stepping, Detector> runs(*system_, detector,
+                                                                   std::move(exact), options_used_);
+            compare(runs, events, trial);
         }
         trial.seconds = detail::processor_seconds() - before;
         return trial;
     }
 
-    /// Finds `events` events with every other method of detection, and with the detector last.
+    /// Finds the first events of `events` runs with every other method of detection, and with the
+    /// detector last.
     template <class Detector>
     [[nodiscard]] std::vector<Rival> rivals(const Detector& detector, std::size_t events,
                                             std::uint64_t seed)
@@ -228,11 +260,9 @@ public:
         detail::RivalRuns<System, X, Stepping, Detector> runs(*system_, detector);
         begin_stage("comparing", events);
         std::uint64_t rounds = 0;
-        while (runs.events() < events && rounds++ < events && goes_on(runs.events())) {
+        while (runs.events() < events && rounds++ < 2 * events && goes_on(runs.events())) {
             const X x0 = start(random).x();
-            Options options = options_used_;
-            options.record_events = false;
-            runs.add(x0, options);
+            runs.add_flight(x0, options_used_);
         }
         return runs.rivals();
     }
@@ -245,13 +275,13 @@ private:
         Mode mode;
         std::array<double, GateRecipe::most> features;
         double value;
-        double weight;
+        bool asked;  ///< a run with the gate asks it here
     };
 
     /// Where states are kept, and how many of those without an event in reach.
     struct Sampling {
         GateSamples& out;
-        double share;  ///< of the states, in [0, 1]
+        double share;  ///< of the states, in [0, 1]; 0: none of any kind
         Random& random;
     };
 
@@ -313,11 +343,13 @@ private:
         GateSamples& out = to.out;
         out.width = width_;
         pending_.clear();
+        take_off(run);
         std::size_t seen = run.run().events.size();
         while (!run.ended() && goes_on(out.events)) {
             remember(run, out);
             if (!run.step()) break;
             ++out.steps;
+            ++steps_since_event_;
             const auto& events = run.run().events;
             for (; seen < events.size(); ++seen) {
                 if (events[seen].kind == EventKind::touch || events[seen].kind == EventKind::time) {
@@ -325,6 +357,7 @@ private:
                 }
                 ++out.events;
                 settle(events[seen], to);
+                take_off(run);
             }
             while (!pending_.empty() && run.t() - pending_.front().t > reach()) {
                 keep(pending_.front(), infinity, infinity, to);
@@ -332,18 +365,22 @@ private:
             }
         }
         pending_.clear();
+        guard_calls_ += run.run().statistics.guard_calls;
+    }
+
+    /// Begins a flight from the start or an event to the next one.
+    void take_off(const Exact& run)
+    {
+        left_ = run.t();
+        steps_since_event_ = 0;
     }
 
     void remember(const Exact& run, GateSamples& out)
     {
-        Pending state{.t = run.t(),
-                      .x = run.x(),
-                      .mode = run.mode(),
-                      .features = {},
-                      .value = 0,
-                      .weight = 1};
+        Pending state{run.t(), run.x(), run.mode(), {}, 0, false};
         training_.recipe.write(*system_, state.mode, state.t, state.x, state.features.data());
         out.visit({state.features.data(), width_});
+        if (walks_ != nullptr) state.asked = walks_->visit(state.t, state.features.data());
         if (training_.kind == GateKind::level) {
             state.value = ricochet::detail::call_guard(*system_, 0, state.mode, state.t, state.x);
         }
@@ -356,6 +393,15 @@ private:
     {
         if (pending_.empty()) return;
         const double back = training_.kind == GateKind::horizon ? time_of_return(event) : infinity;
+        if (walks_ != nullptr) walks_->meet(event.t, back);
+        if (survey_ != nullptr) {
+            const double step =
+                fixed_step ? options_used_.step
+                           : (event.t - left_) / static_cast<double>(1 + steps_since_event_);
+            survey_->step = step;
+            survey_->intervals.push_back((event.t - left_) / step);
+            survey_->dwells.push_back(std::min(back - event.t, reach()) / step);
+        }
         const bool fatal = back - event.t <= reach();
         for (const Pending& state : pending_) {
             if (state.t > event.t) break;
@@ -370,6 +416,11 @@ private:
 
     void keep(const Pending& state, double event, double back, const Sampling& to)
     {
+        if (to.share <= 0) return;
+        if (training_.logarithmic) {
+            keep_by_logarithm(state, event, back, to);
+            return;
+        }
         const bool near = training_.kind == GateKind::horizon
                               ? event <= 2 * reach()
                               : state.value <= training_.levels.back();
@@ -380,33 +431,37 @@ private:
                       fatal ? 1 : 1 / kept);
     }
 
-    /// Time [s] at which a guard is first seen on its side again after its event, at the end of
-    /// a step, if the flow continues without the reset. Infinite: not within the longest
-    /// horizon.
+    /// Keeps a state with a probability that falls with the time to its event, but never below the
+    /// share of clear states.
+    void keep_by_logarithm(const Pending& state, double event, double back, const Sampling& to)
+    {
+        if (state.asked) {
+            to.out.append({state.features.data(), width_}, event, back, state.value, 0);
+            return;
+        }
+        const double shortest = training_.levels.front();
+        const double octaves = 1 + std::log2(training_.levels.back() / shortest);
+        // Half of the states are drawn from the octaves: `each` from every one of them.
+        const double each = 0.5 * static_cast<double>(training_.states) /
+                            (static_cast<double>(training_.events) * octaves);
+        const double near = std::min(1.0, each * shortest / std::max(event, shortest));
+        const double kept = std::max(near, std::min(1.0, 0.5 * to.share));
+        if (!to.random.chance(kept)) return;
+        to.out.append({state.features.data(), width_}, event, back, state.value, 1 / kept);
+    }
+
+    /// Time [s] at which the guard of an event is first seen on its side again.
     template <class E>
     [[nodiscard]] double time_of_return(const E& event)
     {
-        if (event.guard == no_guard) return infinity;
+        using detail::Labelling;
         const Pending& from = pending_.back();
-        const auto side = [&](double t, const X& x) {
-            return ricochet::detail::call_guard(*system_, event.guard, event.mode_before, t, x);
-        };
-        const GuardInfo info = guard_info_of<X>(*system_, event.guard);
-        const double armed = info.crossing == Crossing::falling ? 1
-                             : info.crossing == Crossing::rising
-                                 ? -1
-                                 : std::copysign(1.0, side(from.t, from.x));
-        Options options = options_used_;
-        options.t_start = from.t;
-        options.t_end = event.t + reach() + options.step;
-        options.mode = 0;
-        const detail::FlowOnly<System, X> flow{system_, event.mode_before};
-        Simulation<detail::FlowOnly<System, X>, X, Stepping> on(flow, from.x, options);
-        while (on.step()) {
-            if (on.t() > event.t && armed * side(on.t(), on.x()) > 0) return on.t();
-            if (on.t() > event.t + reach()) break;
-        }
-        return infinity;
+        Labelling how{.options = options_used_, .reach = reach()};
+        how.options.t_start = from.t;
+        const double back =
+            detail::time_of_return<System, X, Stepping>(*system_, event, from.x, how);
+        guard_calls_ += how.calls;
+        return back;
     }
 
     /// Adds short runs from states that differ a little from those in `out`: the gate must be right
@@ -459,62 +514,23 @@ private:
         remember(run, nowhere);
     }
 
-    enum class Agreement {
-        to_the_bit,
-        to_the_error,  ///< up to the error of locating it, from other brackets
-        none,
-    };
-
-    /// Advances both runs to their next event; earlier runs have had `seen` events.
-    template <class Gated>
-    [[nodiscard]] Agreement take_next_event(Exact& exact, Gated& gated, std::uint64_t seen)
+    /// Follows both runs to their end, from the exact one wherever they differ.
+    template <class Runs>
+    void compare(Runs& runs, std::size_t events, GateTrial& trial)
     {
-        const std::size_t before = exact.run().events.size();
-        while (exact.run().events.size() == before && exact.step()) {
-            if (!goes_on(seen + before)) return Agreement::none;
-        }
-        while (gated.run().events.size() == before && gated.advance()) {
-        }
-        const auto& a = exact.run().events;
-        const auto& b = gated.run().events;
-        if (a.size() != b.size()) return Agreement::none;
-        if (a.size() == before) return Agreement::to_the_bit;
-        const double apart = std::fabs(a.back().t - b.back().t);
-        // The errors of location, and those of rounding each time to a double.
-        const double allowed = a.back().error + b.back().error +
-                               std::numeric_limits<double>::epsilon() * std::fabs(a.back().t);
-        if (a.back().guard != b.back().guard || !(apart <= allowed)) return Agreement::none;
-        // States that differ by rounding at one and the same time separate chaotic runs, too.
-        const bool same =
-            apart == 0 && ricochet::detail::same_state(a.back().after, b.back().after);
-        return same ? Agreement::to_the_bit : Agreement::to_the_error;
-    }
-
-    template <class Gated>
-    static void finish(Exact& exact, Gated& gated, GateTrial& trial)
-    {
-        const Statistics a = exact.finish().statistics;
-        const Statistics b = gated.finish().statistics;
-        trial.events += a.events;
-        trial.steps += a.steps;
-        trial.exact_calls += a.guard_calls;
-        trial.gated_calls += b.guard_calls;
-        trial.network_calls += b.network_calls;
-        trial.outside += b.outside_domain;
-        trial.repeated += b.repeated_steps;
-    }
-
-    /// Continues both runs from the exact run's state after a miss. False: they cannot continue.
-    template <class Gated, class Detector>
-    [[nodiscard]] bool restart(std::optional<Exact>& exact, std::optional<Gated>& gated, const X& x,
-                               const Options& options, const Detector& detector) const
-    {
-        try {
-            exact.emplace(*system_, x, options);
-            gated.emplace(*system_, x, options, Stepping{}, detector);
-            return true;
-        } catch (const std::invalid_argument&) {
-            return false;
+        for (;;) {
+            const detail::Agreement next = runs.take_next_event(
+                [&](std::uint64_t seen) { return goes_on(trial.events + seen); });
+            if (stopped_) return;
+            const bool ended = runs.exact().ended();
+            const double t = runs.exact().t();
+            const X x = runs.exact().x();
+            const Mode mode = runs.exact().mode();
+            if (next == detail::Agreement::to_the_bit && !ended) continue;
+            runs.finish(trial);
+            trial.misses += next == detail::Agreement::none ? 1 : 0;
+            if (ended || trial.events >= events || !(runs.options().t_end > t)) return;
+            if (!runs.restart(t, mode, x)) return;
         }
     }
 
@@ -525,7 +541,12 @@ private:
     GateTraining training_;
     std::size_t width_ = 0;
     std::deque<Pending> pending_;
-    std::vector<RunStart<X>> near_;  ///< states shortly before fatal events
+    std::vector<RunStart<X>> near_;       ///< states shortly before fatal events
+    detail::GateWalks* walks_ = nullptr;  ///< of a gate along the exact runs; null: none
+    GateSurvey* survey_ = nullptr;        ///< of the present runs; null: none
+    double left_ = 0;                     ///< [s] start of the present flight
+    std::uint64_t steps_since_event_ = 0;
+    std::uint64_t guard_calls_ = 0;
     ProgressCallback progress_;
     std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
     std::string_view stage_;

@@ -41,6 +41,29 @@ namespace ricochet::learn {
 
 namespace detail {
 
+/// States that the next round learns, too, chosen by the gate of this one.
+template <class Runs>
+[[nodiscard]] GateSamples more_states(Runs& runs, const GateTraining& training, const Model& model,
+                                      std::size_t round)
+{
+    const std::size_t events = training.hard_events > 0 ? training.hard_events : training.events;
+    const std::uint64_t seed = training.seed + 2'000'003 * (round + 2);
+    if (training.logarithmic) return runs.sample_with(model, events, seed);
+    return runs.hard(gates::Gate(model), events, seed);
+}
+
+/// Lowers the thresholds of a gate until its misses, on runs that trained nothing, are as rare as
+/// demanded.
+template <class System, class X, class Stepping>
+void calibrate(GateRuns<System, X, Stepping>& runs, const GateTraining& training,
+               TrainedGate& trained)
+{
+    GateWalks walks(trained.model, calibration_shifts());
+    runs.calibrate(walks, calibration_events(training), training.seed + 4'000'003);
+    if (runs.stopped()) return;
+    trained.report.calibration = lower_thresholds(trained.model, walks, training.miss_rate);
+}
+
 /// Measures the misses of a gate on fresh runs, and the cost of its rivals there.
 template <class System, class X, class Stepping>
 void try_out(GateRuns<System, X, Stepping>& runs, const GateTraining& training,
@@ -70,7 +93,9 @@ void try_out(GateRuns<System, X, Stepping>& runs, const GateTraining& training,
                                      .steps = trial.steps,
                                      .seed = fresh};
     }
-    if (trial.misses > 0 && trained.report.outcome == TrainingOutcome::finished) {
+    const double allowed = training.miss_rate * static_cast<double>(trial.events);
+    if (static_cast<double>(trial.misses) > allowed &&
+        trained.report.outcome == TrainingOutcome::finished) {
         trained.report.outcome = TrainingOutcome::misses_remain;
     }
 }
@@ -127,21 +152,51 @@ template <class System, class X, class Stepping>
     for (std::size_t round = 0; round < training.rounds; ++round) {
         if (!trainer.run(round, progress)) break;
         if (round + 1 == training.rounds) break;
-        const std::size_t events =
-            training.hard_events > 0 ? training.hard_events : training.events;
-        const GateSamples hard =
-            runs.hard(gates::Gate(complete()), events, training.seed + 2'000'003 * (round + 2));
+        const GateSamples hard = detail::more_states(runs, training, complete(), round);
         if (runs.stopped()) break;
         trainer.add(hard);
     }
     trained = {.model = complete(), .report = trainer.report()};
-    trained.report.seconds =
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (runs.stopped()) return stop();
     // Weights that are not finite cannot be tried out.
     const bool usable = trained.report.outcome != TrainingOutcome::stopped &&
                         trained.report.outcome != TrainingOutcome::diverged;
+    if (usable && training.miss_rate > 0 && training.kind == GateKind::horizon) {
+        detail::calibrate(runs, training, trained);
+    }
+    trained.report.guard_calls = runs.guard_calls();
+    trained.report.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (runs.stopped()) return stop();
     if (training.fresh_events > 0 && usable) detail::try_out(runs, training, trained);
+    return trained;
+}
+
+/// First runs of `system` and the training that follows from them for this aim; see `choose`.
+///
+/// @throws std::invalid_argument if the aim is outside its range, or the runs hold no event.
+template <class System, class X, class Stepping>
+[[nodiscard]] std::pair<GateTraining, GateSurvey> survey_gate(
+    const System& system, const Starts<X>& starts, const Stepping& /*stepping*/,
+    const Options& options, const GateAim& aim, const ProgressCallback& progress = {})
+{
+    const GateTraining first = detail::surveying(aim);
+    GateRuns<System, X, Stepping> runs(system, starts, options, first, progress);
+    const GateSurvey survey = runs.survey(first.events, aim.seed + 9'000'003);
+    if (runs.stopped()) return {first, survey};
+    return {choose(aim, survey), survey};
+}
+
+/// Surveys first runs, chooses horizons, width, states and events for the aim, and trains; see
+/// `choose` and the other `train_gate`.
+template <class System, class X, class Stepping>
+[[nodiscard]] TrainedGate train_gate(const System& system, const Starts<X>& starts,
+                                     const Stepping& stepping, const Options& options,
+                                     const GateAim& aim, const ProgressCallback& progress = {})
+{
+    const auto [training, survey] = survey_gate(system, starts, stepping, options, aim, progress);
+    if (survey.intervals.empty()) return interrupted_gate();
+    TrainedGate trained = train_gate(system, starts, stepping, options, training, progress);
+    trained.report.add(survey, aim);
     return trained;
 }
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <stdexcept>
@@ -192,6 +193,16 @@ void check_gate_kind(const gates::Gate& gate, bool horizon)
     throw std::invalid_argument(
         horizon ? "Calibrated: expected a horizon gate, got one of levels; see CalibratedBounds"
                 : "CalibratedBounds: expected a level gate, got one of horizons; see Calibrated");
+}
+
+std::size_t longest_horizon(const gates::Gate& gate) noexcept
+{
+    constexpr double least = 256;
+    constexpr double most = 65'536;
+    const Model& model = gate.model();
+    if (!(model.step_min > 0)) return static_cast<std::size_t>(least);
+    const double steps = std::ceil(model.levels.back().value / model.step_min);
+    return static_cast<std::size_t>(std::clamp(steps, least, most));
 }
 
 void check_longest_interval(std::size_t steps)
