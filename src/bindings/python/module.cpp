@@ -20,6 +20,7 @@
 #include "formula.hpp"
 #include "formula_series.hpp"
 #include "mechanism.hpp"
+#include "numbers.hpp"
 #include "ready.hpp"
 #include "ricochet/nn/model.hpp"
 #include "source.hpp"
@@ -126,6 +127,7 @@ py::list described_systems()
 PYBIND11_MODULE(_ricochet, module)
 {
     using namespace ricochet::python;
+    if (!load_numpy()) throw py::error_already_set();
     module.attr("__version__") = RICOCHET_VERSION;
     py::register_exception_translator([](std::exception_ptr thrown) {
         try {

@@ -11,13 +11,6 @@ namespace ricochet::python {
 
 namespace {
 
-/// Loads NumPy's functions once. (`import_array` is a macro that returns from its function.)
-void require_numpy()
-{
-    static const bool found = [] { return _import_array() >= 0; }();
-    if (!found) throw PythonError();
-}
-
 /// Whether `result` is a truth, or an array of one, such as `x > 0` of a state with one component.
 bool is_truth(PyObject* result)
 {
@@ -28,6 +21,22 @@ bool is_truth(PyObject* result)
 }
 
 }  // namespace
+
+bool load_numpy()
+{
+    if (_import_array() >= 0) return true;
+    PyErr_Clear();
+    const Ref numpy = Ref::take(PyImport_ImportModule("numpy"));
+    const Ref version =
+        Ref::take(numpy ? PyObject_GetAttrString(numpy.get(), "__version__") : nullptr);
+    if (!version) return false;
+    const char* const with = NPY_VERSION >= 0x02000000 ? "2" : "1";
+    PyErr_Format(PyExc_ImportError,
+                 "ricochet: found NumPy %S and a module that was compiled with NumPy %s; expected "
+                 "one that was compiled with NumPy 2, which runs with either",
+                 version.get(), with);
+    return false;
+}
 
 void raise(PyObject* type, const std::string& sentence)
 {
@@ -42,7 +51,6 @@ std::string type_of(PyObject* object)
 
 double as_guard(PyObject* result, const std::string& who)
 {
-    require_numpy();
     if (PyFloat_Check(result)) return PyFloat_AS_DOUBLE(result);
     if (is_truth(result)) return PyObject_IsTrue(result) ? 1 : -1;
     if (PyArray_Check(result)) {
@@ -71,7 +79,6 @@ double as_guard(PyObject* result, const std::string& who)
 Numbers::Numbers(PyObject* result, const char* who, const std::string& of)
     : result_(result), who_(who), of_(of)
 {
-    require_numpy();
     if (PyList_CheckExact(result) || PyTuple_CheckExact(result)) {
         items_ = PySequence_Fast_ITEMS(result);
         size_ = static_cast<std::size_t>(PySequence_Fast_GET_SIZE(result));
@@ -183,7 +190,6 @@ void Numbers::read_objects(const Ref& array)
 void read_matrix(PyObject* result, const std::string& who, const std::array<std::size_t, 2>& shape,
                  double* rows)
 {
-    require_numpy();
     Ref given = Ref::share(result);
     if (PyObject_HasAttrString(result, "toarray")) {
         given = checked(PyObject_CallMethod(result, "toarray", nullptr));
@@ -239,7 +245,6 @@ PyObject* ShownArray::show_list(const State& x)
 PyObject* ShownArray::show(const State& x)
 {
     if (as_list_) return show_list(x);
-    require_numpy();
     auto* array = reinterpret_cast<PyArrayObject*>(array_.get());
     const auto size = static_cast<npy_intp>(x.size());
     if (!array || Py_REFCNT(array) != 1 || PyArray_NDIM(array) != 1 ||

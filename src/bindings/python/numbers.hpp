@@ -12,6 +12,10 @@
 
 namespace ricochet::python {
 
+/// Loads NumPy's functions, without which no other function of this header may be called. False,
+/// with an ImportError set, where the module was compiled for another NumPy.
+[[nodiscard]] bool load_numpy();
+
 [[noreturn]] void raise(PyObject* type, const std::string& sentence);
 
 /// Name of the type of an object.

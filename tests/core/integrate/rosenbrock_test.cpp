@@ -438,8 +438,7 @@ TEST(Rosenbrock, StepsWhoseCubesUnderflowAreTaken)
     for (const double size : {1.0, 1e100, 1e120, 1e150, 1e290}) {
         for (const double atol : {1e-10, 1e-200}) {
             const auto run =
-                integrate(Turning{}, {size, 0},
-                          {.t_end = 1, .rtol = 1e-8, .atol = atol}, Stiff{});
+                integrate(Turning{}, {size, 0}, {.t_end = 1, .rtol = 1e-8, .atol = atol}, Stiff{});
             ASSERT_EQ(run.outcome, Outcome::reached_end) << size << ", " << atol;
             EXPECT_NEAR(run.x[0] / size, std::cos(1.0), 1e-6) << size << ", " << atol;
             EXPECT_NEAR(run.x[1] / size, -std::sin(1.0), 1e-6) << size << ", " << atol;
