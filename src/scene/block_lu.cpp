@@ -11,34 +11,72 @@ namespace {
 /// A pivot that shrinks below this fraction has lost the digits that the iterations need.
 constexpr double least_pivot = 1e-13;
 
-using Block = BlockLu::Block;
+template <std::size_t N>
+using Block = std::array<double, N * N>;
 
-[[nodiscard]] Block product(const Block& a, const Block& b) noexcept
+template <std::size_t N>
+[[nodiscard]] Block<N> product(const Block<N>& a, const Block<N>& b) noexcept
 {
-    return {a[0] * b[0] + a[1] * b[2], a[0] * b[1] + a[1] * b[3], a[2] * b[0] + a[3] * b[2],
-            a[2] * b[1] + a[3] * b[3]};
+    Block<N> out;
+    for (std::size_t row = 0; row < N; ++row) {
+        for (std::size_t column = 0; column < N; ++column) {
+            double sum = a[N * row] * b[column];
+            for (std::size_t k = 1; k < N; ++k) sum += a[N * row + k] * b[N * k + column];
+            out[N * row + column] = sum;
+        }
+    }
+    return out;
 }
 
-[[nodiscard]] double largest(const Block& a) noexcept
+template <std::size_t N>
+[[nodiscard]] double largest(const Block<N>& a) noexcept
 {
-    return std::max({std::abs(a[0]), std::abs(a[1]), std::abs(a[2]), std::abs(a[3])});
+    double most = 0;
+    for (const double x : a) most = std::max(most, std::abs(x));
+    return most;
 }
 
 /// a <- a^-1 by the adjugate, which is as exact as a is well-conditioned.
-[[nodiscard]] bool invert(Block& a, double before) noexcept
+[[nodiscard]] bool invert(Block<2>& a, double before) noexcept
 {
     const double determinant = a[0] * a[3] - a[1] * a[2];
-    const double size = largest(a);
+    const double size = largest<2>(a);
     if (!(std::abs(determinant) > least_pivot * size * before)) return false;
     const double inverse = 1 / determinant;
     a = {a[3] * inverse, -a[1] * inverse, -a[2] * inverse, a[0] * inverse};
     return std::isfinite(inverse);
 }
 
+/// The same with pivots: two of three directions may be soft beside a stiff one, and the adjugate
+/// then loses the square of their ratio.
+[[nodiscard]] bool invert(Block<3>& a, double before)
+{
+    using Matrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+    Eigen::Map<Matrix> matrix(a.data());
+    const Eigen::PartialPivLU<Matrix> factors(matrix);
+    const double pivot = factors.matrixLU().diagonal().cwiseAbs().minCoeff();
+    if (!(pivot > least_pivot * before)) return false;
+    matrix = factors.inverse();
+    return matrix.allFinite();
+}
+
+/// x -= m y
+template <std::size_t N>
+void subtract_product(std::array<double, N>& x, const Block<N>& m,
+                      const std::array<double, N>& y) noexcept
+{
+    for (std::size_t row = 0; row < N; ++row) {
+        double sum = m[N * row] * y[0];
+        for (std::size_t k = 1; k < N; ++k) sum += m[N * row + k] * y[k];
+        x[row] -= sum;
+    }
+}
+
 }  // namespace
 
 /// Orders rows by least degree; all rows that a row is coupled with become coupled.
-void BlockLu::order(int count, const std::vector<std::array<int, 2>>& pairs)
+template <std::size_t N>
+void BlockLu<N>::order(int count, const std::vector<std::array<int, 2>>& pairs)
 {
     std::vector<std::set<int>> near(static_cast<std::size_t>(count));
     for (const auto& [i, j] : pairs) {
@@ -70,7 +108,8 @@ void BlockLu::order(int count, const std::vector<std::array<int, 2>>& pairs)
     }
 }
 
-void BlockLu::analyze(int count, const std::vector<std::array<int, 2>>& pairs)
+template <std::size_t N>
+void BlockLu<N>::analyze(int count, const std::vector<std::array<int, 2>>& pairs)
 {
     order(count, pairs);
     upper_.assign(later_.size(), 0);
@@ -105,66 +144,84 @@ void BlockLu::analyze(int count, const std::vector<std::array<int, 2>>& pairs)
     }
 }
 
-void BlockLu::clear()
+template <std::size_t N>
+void BlockLu<N>::clear()
 {
     std::ranges::fill(blocks_, Block{});
 }
 
-bool BlockLu::factor()
+template <std::size_t N>
+bool BlockLu<N>::factor()
 {
     std::vector<double> sizes(later_.size());
-    for (std::size_t k = 0; k < sizes.size(); ++k) sizes[k] = largest(blocks_[k]);
+    for (std::size_t k = 0; k < sizes.size(); ++k) sizes[k] = largest<N>(blocks_[k]);
     const std::uint32_t* target = targets_.data();
     for (std::size_t k = 0; k < later_.size(); ++k) {
         if (!invert(blocks_[k], sizes[k])) return false;
         const std::size_t count = later_[k].size();
         for (std::size_t a = 0; a < count; ++a) {
             Block& left = blocks_[lower_[k] + a];
-            left = product(left, blocks_[k]);
+            left = product<N>(left, blocks_[k]);
             for (std::size_t b = 0; b < count; ++b) {
-                const Block change = product(left, blocks_[upper_[k] + b]);
+                const Block change = product<N>(left, blocks_[upper_[k] + b]);
                 Block& at = blocks_[*target++];
-                for (std::size_t c = 0; c < 4; ++c) at[c] -= change[c];
+                for (std::size_t c = 0; c < N * N; ++c) at[c] -= change[c];
             }
         }
     }
     return true;
 }
 
-Eigen::VectorXd BlockLu::solve(const Eigen::VectorXd& right) const
+template <std::size_t N>
+std::array<Eigen::Index, N> BlockLu<N>::coordinates(std::size_t i) const
 {
-    Eigen::VectorXd x(right.size());
+    const auto k = static_cast<Eigen::Index>(i);
+    if constexpr (N == 2) {
+        return {2 * k, 2 * k + 1};
+    } else {
+        return {2 * k, 2 * k + 1, 2 * static_cast<Eigen::Index>(place_.size()) + k};
+    }
+}
+
+template <std::size_t N>
+Eigen::VectorXd BlockLu<N>::solve(const Eigen::VectorXd& right) const
+{
+    std::vector<std::array<double, N>> x(place_.size());
     for (std::size_t i = 0; i < place_.size(); ++i) {
-        x.segment<2>(2 * place_[i]) = right.segment<2>(2 * static_cast<Eigen::Index>(i));
+        const auto from = coordinates(i);
+        auto& to = x[static_cast<std::size_t>(place_[i])];
+        for (std::size_t c = 0; c < N; ++c) to[c] = right[from[c]];
     }
     for (std::size_t k = 0; k < later_.size(); ++k) {
-        const double x0 = x[2 * static_cast<Eigen::Index>(k)];
-        const double x1 = x[2 * static_cast<Eigen::Index>(k) + 1];
+        const std::array<double, N> own = x[k];
         for (std::size_t a = 0; a < later_[k].size(); ++a) {
-            const Block& m = blocks_[lower_[k] + a];
-            x[2 * later_[k][a]] -= m[0] * x0 + m[1] * x1;
-            x[2 * later_[k][a] + 1] -= m[2] * x0 + m[3] * x1;
+            subtract_product<N>(x[static_cast<std::size_t>(later_[k][a])], blocks_[lower_[k] + a],
+                                own);
         }
     }
     for (std::size_t k = later_.size(); k-- > 0;) {
-        double y0 = x[2 * static_cast<Eigen::Index>(k)];
-        double y1 = x[2 * static_cast<Eigen::Index>(k) + 1];
+        std::array<double, N> y = x[k];
         for (std::size_t a = 0; a < later_[k].size(); ++a) {
-            const Block& m = blocks_[upper_[k] + a];
-            const double x0 = x[2 * later_[k][a]];
-            const double x1 = x[2 * later_[k][a] + 1];
-            y0 -= m[0] * x0 + m[1] * x1;
-            y1 -= m[2] * x0 + m[3] * x1;
+            subtract_product<N>(y, blocks_[upper_[k] + a],
+                                x[static_cast<std::size_t>(later_[k][a])]);
         }
         const Block& d = blocks_[k];
-        x[2 * static_cast<Eigen::Index>(k)] = d[0] * y0 + d[1] * y1;
-        x[2 * static_cast<Eigen::Index>(k) + 1] = d[2] * y0 + d[3] * y1;
+        for (std::size_t row = 0; row < N; ++row) {
+            double sum = d[N * row] * y[0];
+            for (std::size_t c = 1; c < N; ++c) sum += d[N * row + c] * y[c];
+            x[k][row] = sum;
+        }
     }
     Eigen::VectorXd out(right.size());
     for (std::size_t i = 0; i < place_.size(); ++i) {
-        out.segment<2>(2 * static_cast<Eigen::Index>(i)) = x.segment<2>(2 * place_[i]);
+        const auto to = coordinates(i);
+        const auto& from = x[static_cast<std::size_t>(place_[i])];
+        for (std::size_t c = 0; c < N; ++c) out[to[c]] = from[c];
     }
     return out;
 }
+
+template class BlockLu<2>;
+template class BlockLu<3>;
 
 }  // namespace ricochet::detail

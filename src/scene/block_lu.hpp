@@ -1,4 +1,4 @@
-// Elimination of sparse matrices of 2 x 2 blocks whose symmetric pattern is known in advance.
+// Elimination of sparse matrices of small blocks whose symmetric pattern is known in advance.
 //
 // Factors A = L U in an order of least degree, with pivots within the diagonal blocks alone.
 // Matrices of contacts are small and are factored again and again with other numbers in the same
@@ -13,10 +13,13 @@
 
 namespace ricochet::detail {
 
+/// Blocks of N x N, N = 2 or 3. Vectors have two coordinates for each block, and for N = 3 a third
+/// one for each block after all these.
+template <std::size_t N>
 class BlockLu {
 public:
-    /// Row-major: xx, xy, yx, yy.
-    using Block = std::array<double, 4>;
+    /// Row-major.
+    using Block = std::array<double, N * N>;
 
     /// Prepares for `count` diagonal blocks, and blocks at (i, j) and (j, i) of each pair.
     void analyze(int count, const std::vector<std::array<int, 2>>& pairs);
@@ -31,6 +34,11 @@ public:
     {
         for (const std::size_t at : pairs_[pair]) add_to(at, -1, block);
     }
+    /// Adds to the block (i, j) of a pair, or with `transposed` to (j, i).
+    void add(std::size_t pair, bool transposed, const Block& block)
+    {
+        add_to(pairs_[pair][transposed], 1, block);
+    }
 
     /// False where a diagonal block is singular, or so small compared with its first value that
     /// digits are lost.
@@ -40,9 +48,11 @@ public:
 private:
     void add_to(std::size_t at, double sign, const Block& block)
     {
-        for (std::size_t k = 0; k < 4; ++k) blocks_[at][k] += sign * block[k];
+        for (std::size_t k = 0; k < N * N; ++k) blocks_[at][k] += sign * block[k];
     }
     void order(int count, const std::vector<std::array<int, 2>>& pairs);
+    /// The coordinates of block i in a vector.
+    [[nodiscard]] std::array<Eigen::Index, N> coordinates(std::size_t i) const;
 
     std::vector<int> place_;               ///< of a block's row in the elimination
     std::vector<std::vector<int>> later_;  ///< rows with which a row is coupled when it is

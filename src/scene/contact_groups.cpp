@@ -32,12 +32,14 @@ public:
     }
     void commit(double s) override { island_.commit(s); }
     std::array<double, 2> chord(std::uint32_t id) const override { return island_.chord(id); }
+    double chord_spin(std::uint32_t id) const override { return island_.chord_spin(id); }
     IslandBody body(std::uint32_t id) const override { return island_.body(id); }
     void set_crowded(bool crowded) override { island_.set_crowded(crowded); }
     void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity) override
     {
         island_.set_velocity(id, velocity);
     }
+    void set_spin(std::uint32_t id, double spin) override { island_.set_spin(id, spin); }
     std::vector<std::vector<std::uint32_t>> groups() const override { return island_.groups(); }
     std::vector<IslandContact> contacts() const override { return island_.contacts(); }
     std::vector<IslandContact> arrivals() const override { return island_.arrivals(); }

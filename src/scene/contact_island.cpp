@@ -69,6 +69,7 @@ void ContactIsland::assemble(double h, const Eigen::VectorXd& v)
         problem_.momentum[k] = b.mass * (v[k] + h * gravity_[0]);
         problem_.momentum[k + 1] = b.mass * (v[k + 1] + h * gravity_[1]);
     }
+    set_edges_momentum(v, problem_);
     couple_springs(h);
 }
 
@@ -79,6 +80,7 @@ LawContact ContactIsland::law_contact(const Touch& touch, double h) const
                  .normal = touch.normal,
                  .offset = {},
                  .friction = touch.law.friction};
+    c.edges = {edge_of(touch.body), touch.wall ? -1 : edge_of(touch.other)};
     // An overlap by rounding is removed in one step; a deeper one is not pushed out at a speed.
     c.offset[0] = std::max(touch.gap, -closed_gap * size_of(touch.body)) / h;
     if (options_.crowded && touch.gap < 0) {
@@ -204,11 +206,11 @@ double ContactIsland::relative_normal(const Touch& touch, const Eigen::VectorXd&
 /// Change of velocities by forces alone in the current step.
 Eigen::VectorXd ContactIsland::kick() const
 {
-    Eigen::VectorXd kick = problem_.momentum;
+    Eigen::VectorXd kick = problem_.momentum.head(q_.size());
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
         kick.segment<2>(2 * static_cast<Eigen::Index>(i)) /= problem_.inertia[i];
     }
-    kick -= v_;
+    kick -= v_.head(q_.size());
     return kick;
 }
 
@@ -274,10 +276,7 @@ bool ContactIsland::set_rebounds(double h)
     if (rebounds_ == 0) return false;
     impacts_.inertia.clear();
     for (const IslandBody& b : bodies_) impacts_.inertia.push_back(b.mass);
-    impacts_.momentum = v_next_;
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
-        impacts_.momentum.segment<2>(2 * static_cast<Eigen::Index>(i)) *= bodies_[i].mass;
-    }
+    set_momentum(v_next_, impacts_);
     return true;
 }
 
@@ -288,6 +287,11 @@ double ContactIsland::energy_between(const Eigen::VectorXd& a, const Eigen::Vect
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
         const auto k = 2 * static_cast<Eigen::Index>(i);
         sum += 0.5 * bodies_[i].mass * (a.segment<2>(k) - b.segment<2>(k)).squaredNorm();
+    }
+    for (std::size_t i = 0; i < problem_.turning.size(); ++i) {
+        if (problem_.turning[i] == 0) continue;
+        const auto k = static_cast<Eigen::Index>(2 * bodies_.size() + i);
+        sum += 0.5 / problem_.turning[i] * (a[k] - b[k]) * (a[k] - b[k]);
     }
     return sum;
 }
@@ -508,7 +512,7 @@ void ContactIsland::commit(double s)
         return;
     }
     const double free = free_speed();
-    q_ += s * v_next_;
+    q_ += s * v_next_.head(q_.size());
     if (whole) {
         v_ = options_.crowded ? v_end_ : v_next_;
     } else {
@@ -572,7 +576,7 @@ IslandOutcome ContactIsland::advance_by_halves(double until)
         return whole.outcome;
     }
     const double end = planned_until_;
-    const Eigen::VectorXd at = q_ + whole.length * v_next_;
+    const Eigen::VectorXd at = q_ + whole.length * v_next_.head(q_.size());
     for (const double target : {t_ + whole.length / 2, end}) {
         const IslandOutcome outcome = advance_once(target);
         if (outcome != IslandOutcome::reached) return outcome;

@@ -1,10 +1,10 @@
 // A connected group of bodies and walls in lasting contact, in the plane.
 //
 // The scene's loop hands a group over where impacts accumulate or a contact is pressed together,
-// and takes it back where no contact remains. Bodies are discs without spin (points are
-// discs of radius 0): two coordinates each, so that friction acts on centres and a force at a rim
-// exerts no torque. A disc on an incline slides like a block and does not roll; angular momentum is
-// not conserved in the friction of a pair.
+// and takes it back where no contact remains. Bodies are discs (points are discs of radius 0) of
+// two coordinates each. Where one has an inertia, each has a third one, the speed r w of its edge:
+// friction then acts on edges and turns discs, and the angular momentum of a pair is kept. On discs
+// without an inertia it acts at the centre: such a disc slides down an incline like a block.
 //
 // A step of length h is implicit in velocities, contacts, springs, dampers and drag, and explicit
 // in gravity (Moreau's rule over Signorini's and Coulomb's laws; with the gap in the law as in M.
@@ -14,7 +14,9 @@
 //     M (v+ - v) = h F + G' p,    q+ = q + h v+
 //     0 <= p_n,  n.(v+ - w) + g(q)/h >= 0, complementary;  friction on t.(v+ - w)
 //
-// with w the velocity of a wall. The law has restitution 0. Three properties follow:
+// with w the velocity of a wall; where discs turn, friction is on the slip of edges at the end of
+// the step, and an angle advances by h times the spin there. The law has restitution 0. Three
+// properties follow:
 //
 //  - distances of discs from discs, lines and segments are convex, and their linear model is below
 //    them: no gap of a step's end is negative beyond rounding, whatever the step;
@@ -95,6 +97,8 @@ public:
     [[nodiscard]] double planned_step() const noexcept { return planned_; }
     /// The planned motion: at + s chord.
     [[nodiscard]] std::array<double, 2> chord(std::uint32_t id) const;
+    /// [rad/s] Rate of the angle of a body in it.
+    [[nodiscard]] double chord_spin(std::uint32_t id) const;
     /// Advances to s, at most the length of the plan.
     void commit(double s);
 
@@ -108,6 +112,8 @@ public:
     [[nodiscard]] IslandBody body(std::uint32_t id) const;
     /// Sets a velocity after an impact, and wakes the island.
     void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity);
+    /// The same for a spin [rad/s] of a disc that turns.
+    void set_spin(std::uint32_t id, double spin);
 
     /// Applies Newton's law of impact and Coulomb's law of friction at all contacts that touch and
     /// approach, together. Refused where the two would raise the energy, or are not solved.
@@ -152,6 +158,10 @@ private:
     [[nodiscard]] std::string name_of(const Touch& touch) const;
     [[nodiscard]] double size_of(int body) const;
     [[nodiscard]] int place_of(std::uint32_t id) const;
+    [[nodiscard]] int edge_of(int body) const;
+    void set_turning();
+    void set_momentum(const Eigen::VectorXd& v, LawProblem& problem) const;
+    void set_edges_momentum(const Eigen::VectorXd& v, LawProblem& problem) const;
 
     void find_touches(const std::vector<double>& reach);
     void pair_touches(const std::vector<double>& reach);
@@ -206,7 +216,8 @@ private:
     };
     std::vector<Link> links_;
     double t_ = 0;
-    Eigen::VectorXd q_, v_;
+    Eigen::VectorXd q_;
+    Eigen::VectorXd v_;  ///< and, where discs turn, the speeds of all edges after these
     bool asleep_ = false;
     std::uint32_t open_steps_ = 0;
     double slow_since_ = std::numeric_limits<double>::infinity();

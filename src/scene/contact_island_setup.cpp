@@ -24,7 +24,8 @@ bool finite(const std::array<double, 2>& x)
 
 auto key(const IslandBody& b)
 {
-    return std::tuple(b.at[0], b.at[1], b.velocity[0], b.velocity[1], b.mass, b.radius, b.drag);
+    return std::tuple(b.at[0], b.at[1], b.velocity[0], b.velocity[1], b.mass, b.radius, b.drag,
+                      b.inertia, b.spin);
 }
 auto key(const IslandWall& w)
 {
@@ -41,6 +42,18 @@ void check_body(const IslandBody& b)
     expect(b.radius >= 0 && std::isfinite(b.radius), "radius must be finite, zero or positive",
            b.radius);
     expect(b.drag >= 0 && std::isfinite(b.drag), "drag must be finite, zero or positive", b.drag);
+    expect(b.inertia >= 0 && std::isfinite(b.inertia), "inertia must be finite, zero or positive",
+           b.inertia);
+    const double edge = b.radius * b.radius / b.inertia;  // [1/kg]
+    if (b.inertia > 0 && !(edge > 0 && std::isfinite(edge) && std::isfinite(1 / edge))) {
+        refuse(
+            fmt::format("the edge of body {} must have a finite inertia I / r^2 above 0, got I "
+                        "= {:g} kg m^2 and r = {:g} m",
+                        b.id, b.inertia, b.radius));
+    }
+    if (!std::isfinite(b.radius * b.spin)) {
+        refuse(fmt::format("spin of body {} must be finite, got {:g} rad/s", b.id, b.spin));
+    }
 }
 
 }  // namespace
@@ -97,7 +110,22 @@ void ContactIsland::sort_members(IslandSetup setup)
         q_.segment<2>(2 * i) << b.at[0], b.at[1];
         v_.segment<2>(2 * i) << b.velocity[0], b.velocity[1];
     }
+    set_turning();
     v_next_ = v_;
+}
+
+/// Adds the speeds of edges to the coordinates where a disc turns.
+void ContactIsland::set_turning()
+{
+    const auto turns = [](const IslandBody& b) { return b.inertia > 0; };
+    if (std::ranges::none_of(bodies_, turns)) return;
+    v_.conservativeResize(3 * static_cast<Eigen::Index>(bodies_.size()));
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+        const IslandBody& b = bodies_[i];
+        problem_.turning.push_back(turns(b) ? b.radius * b.radius / b.inertia : 0);
+        v_[static_cast<Eigen::Index>(2 * bodies_.size() + i)] = turns(b) ? b.radius * b.spin : 0;
+    }
+    impacts_.turning = problem_.turning;
 }
 
 ContactIsland::ContactIsland(IslandSetup setup, const IslandOptions& options, double t)
@@ -117,6 +145,22 @@ int ContactIsland::place_of(std::uint32_t id) const
     const auto found = places_.find(id);
     if (found == places_.end()) refuse(fmt::format("there is no body {}", id));
     return found->second;
+}
+
+/// The place of the speed of its edge, -1 for a body that does not turn.
+int ContactIsland::edge_of(int body) const
+{
+    const auto i = static_cast<std::size_t>(body);
+    if (problem_.turning.empty() || problem_.turning[i] == 0) return -1;
+    return static_cast<int>(2 * bodies_.size() + i);
+}
+
+void ContactIsland::set_spin(std::uint32_t id, double spin)
+{
+    const int i = place_of(id);
+    if (edge_of(i) < 0) refuse(fmt::format("body {} does not turn", id));
+    v_[edge_of(i)] = bodies_[static_cast<std::size_t>(i)].radius * spin;
+    wake();
 }
 
 /// Size of the coordinates, in proportion to which rounding grows [m].
@@ -148,7 +192,7 @@ void ContactIsland::project(double most)
         find_touches(close);
         double deepest = 0;
         problem_.contacts.clear();
-        problem_.momentum.setZero(q_.size());
+        problem_.momentum.setZero(v_.size());
         for (const Touch& touch : touches_) {
             const double size = size_of(touch.body);
             if (!(touch.gap >= -most * size)) {
@@ -164,7 +208,7 @@ void ContactIsland::project(double most)
         impulses_.resize(0);
         Eigen::VectorXd way;
         law_.solve(problem_, impulses_, way);
-        q_ += way;
+        q_ += way.head(q_.size());
     }
     statistics_.projected = (q_ - start).lpNorm<Eigen::Infinity>();
 }

@@ -15,7 +15,35 @@ IslandBody ContactIsland::body(std::uint32_t id) const
     IslandBody b = bodies_[static_cast<std::size_t>(i)];
     b.at = {q_[2 * i], q_[2 * i + 1]};
     b.velocity = {v_[2 * i], v_[2 * i + 1]};
+    const int edge = edge_of(i);
+    if (edge >= 0) b.spin = v_[edge] / b.radius;
     return b;
+}
+
+double ContactIsland::chord_spin(std::uint32_t id) const
+{
+    const int i = place_of(id);
+    const int edge = edge_of(i);
+    if (asleep_ || edge < 0) return 0;
+    return v_next_[edge] / bodies_[static_cast<std::size_t>(i)].radius;
+}
+
+/// The momenta M v, as those of a problem.
+void ContactIsland::set_momentum(const Eigen::VectorXd& v, LawProblem& problem) const
+{
+    problem.momentum = v;
+    for (std::size_t i = 0; i < bodies_.size(); ++i) {
+        problem.momentum.segment<2>(2 * static_cast<Eigen::Index>(i)) *= bodies_[i].mass;
+    }
+    set_edges_momentum(v, problem);
+}
+
+void ContactIsland::set_edges_momentum(const Eigen::VectorXd& v, LawProblem& problem) const
+{
+    for (std::size_t i = 0; i < problem.turning.size(); ++i) {
+        const auto k = static_cast<Eigen::Index>(2 * bodies_.size() + i);
+        problem.momentum[k] = problem.turning[i] > 0 ? v[k] / problem.turning[i] : 0;
+    }
 }
 
 void ContactIsland::set_velocity(std::uint32_t id, const std::array<double, 2>& velocity)
@@ -69,6 +97,8 @@ double ContactIsland::energy() const
         const auto k = 2 * static_cast<Eigen::Index>(i);
         sum += bodies_[i].mass *
                (v_.segment<2>(k).squaredNorm() / 2 - gravity_[0] * q_[k] - gravity_[1] * q_[k + 1]);
+        const int edge = edge_of(static_cast<int>(i));
+        if (edge >= 0) sum += v_[edge] * v_[edge] / problem_.turning[i] / 2;
     }
     for (const Link& k : links_) {
         const double length =
@@ -89,14 +119,11 @@ StrikeReport ContactIsland::strike()
     find_touches(reach);
     problem_.couplings.clear();
     problem_.contacts.clear();
-    problem_.momentum = v_;
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
-        problem_.inertia.resize(bodies_.size());
-        problem_.inertia[i] = bodies_[i].mass;
-        problem_.momentum.segment<2>(2 * static_cast<Eigen::Index>(i)) *= bodies_[i].mass;
-        report.energy_before +=
-            bodies_[i].mass * v_.segment<2>(2 * static_cast<Eigen::Index>(i)).squaredNorm() / 2;
-    }
+    problem_.inertia.clear();
+    for (const IslandBody& b : bodies_) problem_.inertia.push_back(b.mass);
+    set_momentum(v_, problem_);
+    const Eigen::VectorXd still = Eigen::VectorXd::Zero(v_.size());
+    report.energy_before = energy_between(v_, still);
     std::vector<std::array<double, 2>> wall_velocities;
     for (const Touch& touch : touches_) {
         LawContact contact = law_contact(touch, options_.step);
@@ -110,10 +137,7 @@ StrikeReport ContactIsland::strike()
     Eigen::VectorXd v;
     report.law = law_.solve(problem_, p, v);
     double work = 0;  // of moving walls
-    for (std::size_t i = 0; i < bodies_.size(); ++i) {
-        report.energy_after +=
-            bodies_[i].mass * v.segment<2>(2 * static_cast<Eigen::Index>(i)).squaredNorm() / 2;
-    }
+    report.energy_after = energy_between(v, still);
     for (std::size_t k = 0; k < wall_velocities.size(); ++k) {
         const auto i = 2 * static_cast<Eigen::Index>(k);
         work -= p[i] * wall_velocities[k][0] + p[i + 1] * wall_velocities[k][1];

@@ -49,7 +49,11 @@ ContactLaw::Pair ContactLaw::relative(const LawContact& c, const Eigen::VectorXd
         y -= v[2 * c.second + 1];
     }
     const auto [nx, ny] = c.normal;
-    return {nx * x + ny * y + c.offset[0], nx * y - ny * x + c.offset[1]};
+    Pair u{nx * x + ny * y + c.offset[0], nx * y - ny * x + c.offset[1]};
+    for (const int edge : c.edges) {
+        if (edge >= 0) u.tangential -= v[edge];
+    }
+    return u;
 }
 
 /// Adds G' p of one contact to b.
@@ -60,101 +64,38 @@ void ContactLaw::push(const LawContact& c, double normal, double tangential, Eig
     const double y = ny * normal + nx * tangential;
     b[2 * c.first] += x;
     b[2 * c.first + 1] += y;
+    for (const int edge : c.edges) {
+        if (edge >= 0) b[edge] -= tangential;
+    }
     if (c.second < 0) return;
     b[2 * c.second] -= x;
     b[2 * c.second + 1] -= y;
 }
 
-/// Effective inertia [kg] of the bodies at a contact, without springs.
-double ContactLaw::unit(const LawContact& c) const
+/// Finds the units of inertia of the contacts.
+void ContactLaw::set_units()
 {
-    const double first = problem_->inertia[static_cast<std::size_t>(c.first)];
-    if (c.second < 0) return first;
-    const double second = problem_->inertia[static_cast<std::size_t>(c.second)];
-    return first * second / (first + second);
-}
-
-/// Adds to a list of entries the coupling of `a` with `b`, or a term of `a` alone.
-void ContactLaw::add_entries(int a, int b, const BlockLu::Block& block)
-{
-    const auto add = [&](int row, int column, double sign) {
-        for (int k = 0; k < 4; ++k) {
-            triplets_.emplace_back(2 * row + k / 2, 2 * column + k % 2,
-                                   sign * block[static_cast<std::size_t>(k)]);
-        }
-    };
-    add(a, a, 1);
-    if (b < 0) return;
-    add(b, b, 1);
-    add(a, b, -1);
-    add(b, a, -1);
-}
-
-/// Assembles A by blocks: add(a, b, pair, block) for a coupling of a and b, with the place of their
-/// pair in the pattern; b is -1 for a term of a alone.
-template <class Add>
-std::size_t ContactLaw::assemble_inertia(const Add& add) const
-{
-    for (std::size_t b = 0; b < problem_->inertia.size(); ++b) {
-        const double m = problem_->inertia[b];
-        add(static_cast<int>(b), -1, 0, {m, 0, 0, m});
-    }
-    std::size_t pair = 0;
-    for (const LawCoupling& k : problem_->couplings) {
-        add(k.first, k.second, pair++, {k.xx, k.xy, k.xy, k.yy});
-    }
-    return pair;
-}
-
-/// Assembles A + G' D G, with D = -dp/du of the active contacts.
-template <class Add>
-void ContactLaw::assemble(const Add& add) const
-{
-    std::size_t pair = assemble_inertia(add);
-    for (std::size_t k = 0; k < problem_->contacts.size(); ++k) {
-        const LawContact& c = problem_->contacts[k];
-        const std::size_t own = c.second >= 0 ? pair++ : 0;
-        if (active_[k] == Active::open) continue;
-        const double rho = stiffness_ * unit(c);
-        if (active_[k] == Active::sticks) {
-            add(c.first, c.second, own, {rho, 0, 0, rho});
-            continue;
-        }
-        const double slope = active_[k] == Active::slips_forward ? c.friction : -c.friction;
-        const auto [nx, ny] = c.normal;
-        const double x = rho * (nx - slope * ny);
-        const double y = rho * (ny + slope * nx);
-        add(c.first, c.second, own, {x * nx, x * ny, y * nx, y * ny});
-    }
-}
-
-void ContactLaw::factor_inertia()
-{
-    if (problem_->couplings.empty()) return;
-    triplets_.clear();
-    assemble_inertia([this](int a, int b, std::size_t /*pair*/, const BlockLu::Block& block) {
-        add_entries(a, b, block);
-    });
-    const Eigen::Index n = problem_->momentum.size();
-    sparse_.resize(n, n);
-    sparse_.setFromTriplets(triplets_.begin(), triplets_.end());
-    inertia_factor_.compute(sparse_);
-}
-
-/// The order of elimination belongs to the pairs in contact, and is kept while they stay.
-void ContactLaw::compare_pattern()
-{
-    std::vector<std::array<int, 2>> pattern;
-    pattern.reserve(problem_->contacts.size() + problem_->couplings.size());
-    for (const LawCoupling& k : problem_->couplings) pattern.push_back({k.first, k.second});
+    units_.clear();
+    const std::size_t bodies = problem_->inertia.size();
     for (const LawContact& c : problem_->contacts) {
-        if (c.second >= 0) pattern.push_back({c.first, c.second});
+        double normal = problem_->inertia[static_cast<std::size_t>(c.first)];
+        if (c.second >= 0) {
+            const double second = problem_->inertia[static_cast<std::size_t>(c.second)];
+            normal = normal * second / (normal + second);
+        }
+        double of_edges = 0;
+        for (const int edge : c.edges) {
+            if (edge >= 0)
+                of_edges += problem_->turning[static_cast<std::size_t>(edge) - 2 * bodies];
+        }
+        units_.push_back({normal, of_edges > 0 ? 1 / (1 / normal + of_edges) : normal});
     }
-    const auto count = static_cast<int>(problem_->inertia.size());
-    if (count == pattern_count_ && pattern == pattern_) return;
-    pattern_count_ = count;
-    pattern_.swap(pattern);
-    block_lu_.analyze(count, pattern_);
+}
+
+/// Stiffnesses of a contact.
+ContactLaw::Pair ContactLaw::rho(std::size_t k) const
+{
+    return {stiffness_ * units_[k].normal, stiffness_ * units_[k].tangential};
 }
 
 /// v = A^-1 (b + G' p)
@@ -173,6 +114,10 @@ void ContactLaw::follow(const Eigen::VectorXd& p, Eigen::VectorXd& v)
     for (std::size_t b = 0; b < problem_->inertia.size(); ++b) {
         v.segment<2>(2 * static_cast<Eigen::Index>(b)) /= problem_->inertia[b];
     }
+    const auto count = static_cast<Eigen::Index>(problem_->turning.size());
+    for (Eigen::Index b = 0; b < count; ++b) {
+        v[2 * count + b] *= problem_->turning[static_cast<std::size_t>(b)];
+    }
 }
 
 /// The largest relative velocity without impulses, in units of equal mass: open gaps count at the
@@ -181,15 +126,19 @@ void ContactLaw::follow(const Eigen::VectorXd& p, Eigen::VectorXd& v)
 void ContactLaw::set_scale(const Eigen::VectorXd& free)
 {
     scale_ = 0;
-    for (const LawContact& c : problem_->contacts) {
+    for (std::size_t k = 0; k < problem_->contacts.size(); ++k) {
+        const LawContact& c = problem_->contacts[k];
         const Pair u = relative(c, free);
         const double normal = u.normal < 0 ? std::max(-u.normal, std::abs(u.normal - c.offset[0]))
                                            : std::abs(u.normal - c.offset[0]);
         const double largest = std::max(normal, std::abs(u.tangential));
         double speed = free.segment<2>(2 * c.first).norm();
         if (c.second >= 0) speed = std::max(speed, free.segment<2>(2 * c.second).norm());
+        for (const int edge : c.edges) {
+            if (edge >= 0) speed = std::max(speed, std::abs(free[edge]));
+        }
         const double told = 8 * std::numeric_limits<double>::epsilon() / tolerance_ * speed;
-        scale_ = std::max(scale_, std::max(largest, told) * std::sqrt(unit(c)));
+        scale_ = std::max(scale_, std::max(largest, told) * std::sqrt(units_[k].normal));
     }
 }
 
@@ -199,13 +148,16 @@ double ContactLaw::residual(const Eigen::VectorXd& p, const Eigen::VectorXd& v) 
     Eigen::Index i = 0;
     for (const LawContact& c : problem_->contacts) {
         const Pair u = relative(c, v);
-        const double mass = unit(c);
+        const auto [mass, across] = units_[static_cast<std::size_t>(i / 2)];
         const double bound = c.friction * std::max(0.0, p[i]);
-        const double held = std::clamp(p[i + 1] - mass * u.tangential, -bound, bound);
+        const double held = std::clamp(p[i + 1] - across * u.tangential, -bound, bound);
+        const double normal = std::abs(std::min(p[i], mass * u.normal));
+        const double tangential = std::abs(p[i + 1] - held);
         const double defect =
-            std::max(std::abs(std::min(p[i], mass * u.normal)), std::abs(p[i + 1] - held));
+            across == mass ? std::max(normal, tangential) / std::sqrt(mass)
+                           : std::max(normal / std::sqrt(mass), tangential / std::sqrt(across));
         if (!std::isfinite(defect)) return std::numeric_limits<double>::infinity();
-        worst = std::max(worst, defect / std::sqrt(mass));
+        worst = std::max(worst, defect);
         i += 2;
     }
     return scale_ > 0 ? worst / scale_ : worst;
@@ -219,11 +171,11 @@ bool ContactLaw::choose(const Eigen::VectorXd& p, const Eigen::VectorXd& u)
     for (std::size_t k = 0; k < contacts.size(); ++k) {
         const LawContact& c = contacts[k];
         const auto i = 2 * static_cast<Eigen::Index>(k);
-        const double rho = stiffness_ * unit(c);
-        const double normal = p[i] - rho * u[i];
+        const auto [stiff_n, stiff_t] = rho(k);
+        const double normal = p[i] - stiff_n * u[i];
         chosen_[k] = Active::open;
         if (!(normal > 0)) continue;
-        const double tangential = p[i + 1] - rho * u[i + 1];
+        const double tangential = p[i + 1] - stiff_t * u[i + 1];
         const double bound = c.friction * normal;
         if (c.friction == 0) {
             chosen_[k] = Active::slips_forward;
@@ -236,29 +188,6 @@ bool ContactLaw::choose(const Eigen::VectorXd& p, const Eigen::VectorXd& u)
     const bool changed = chosen_ != active_;
     active_.swap(chosen_);
     return changed;
-}
-
-/// Factors A + G' D G by blocks or, where pivots between blocks are needed, with such pivots.
-bool ContactLaw::factor()
-{
-    block_lu_.clear();
-    assemble([this](int a, int b, std::size_t pair, const BlockLu::Block& block) {
-        block_lu_.add(a, block);
-        if (b < 0) return;
-        block_lu_.add(b, block);
-        block_lu_.subtract(pair, block);
-    });
-    blocked_ = block_lu_.factor();
-    if (blocked_) return true;
-    triplets_.clear();
-    assemble([this](int a, int b, std::size_t /*pair*/, const BlockLu::Block& block) {
-        add_entries(a, b, block);
-    });
-    const Eigen::Index n = problem_->momentum.size();
-    sparse_.resize(n, n);
-    sparse_.setFromTriplets(triplets_.begin(), triplets_.end());
-    sparse_lu_.compute(sparse_);
-    return sparse_lu_.info() == Eigen::Success;
 }
 
 /// The impulses of the active contacts, and the relative velocities u that belong to them. Only the
@@ -281,10 +210,11 @@ void ContactLaw::improve(Eigen::VectorXd& p, Eigen::VectorXd& u)
             if (p[i] != 0 || p[i + 1] != 0) push(c, -p[i], -p[i + 1], right_);
             continue;
         }
-        const double rho = stiffness_ * unit(c);
-        const double normal = -rho * u[i];
+        const auto [stiff_n, stiff_t] = rho(k);
+        const double normal = -stiff_n * u[i];
         const bool sticks = active_[k] == Active::sticks;
-        push(c, normal, sticks ? -rho * u[i + 1] : slope(k) * (p[i] + normal) - p[i + 1], right_);
+        push(c, normal, sticks ? -stiff_t * u[i + 1] : slope(k) * (p[i] + normal) - p[i + 1],
+             right_);
     }
     linear_ = solve_factored(right_);
     for (std::size_t k = 0; k < contacts.size(); ++k) {
@@ -297,20 +227,14 @@ void ContactLaw::improve(Eigen::VectorXd& p, Eigen::VectorXd& u)
             p[i] = p[i + 1] = 0;
             continue;
         }
-        const double rho = stiffness_ * unit(c);
-        p[i] -= rho * u[i];
+        const auto [stiff_n, stiff_t] = rho(k);
+        p[i] -= stiff_n * u[i];
         if (active_[k] == Active::sticks) {
-            p[i + 1] -= rho * u[i + 1];
+            p[i + 1] -= stiff_t * u[i + 1];
         } else {
             p[i + 1] = slope(k) * p[i];
         }
     }
-}
-
-Eigen::VectorXd ContactLaw::solve_factored(const Eigen::VectorXd& right) const
-{
-    if (blocked_) return block_lu_.solve(right);
-    return sparse_lu_.solve(right);
 }
 
 /// The nearest impulses within the law's bounds.
@@ -378,8 +302,9 @@ void ContactLaw::relax(Eigen::VectorXd& p, Eigen::VectorXd& v, int times)
         Eigen::Index i = 0;
         for (const LawContact& c : problem_->contacts) {
             const Pair u = relative(c, v);
-            p[i] -= part * unit(c) * u.normal;
-            p[i + 1] -= part * unit(c) * u.tangential;
+            const auto [mass, across] = units_[static_cast<std::size_t>(i / 2)];
+            p[i] -= part * mass * u.normal;
+            p[i + 1] -= part * across * u.tangential;
             i += 2;
         }
         confine(p);
@@ -393,14 +318,18 @@ void ContactLaw::sweep(Eigen::VectorXd& p, Eigen::VectorXd& v)
     Eigen::Index i = 0;
     for (const LawContact& c : problem_->contacts) {
         const Pair u = relative(c, v);
-        const double mass = unit(c);
+        const auto [mass, across] = units_[static_cast<std::size_t>(i / 2)];
         const double normal = std::max(0.0, p[i] - mass * u.normal);
         const double bound = c.friction * normal;
-        const double tangential = std::clamp(p[i + 1] - mass * u.tangential, -bound, bound);
+        const double tangential = std::clamp(p[i + 1] - across * u.tangential, -bound, bound);
         const double n = normal - p[i];
         const double t = tangential - p[i + 1];
         p[i] = normal, p[i + 1] = tangential;
         i += 2;
+        for (const int edge : c.edges) {
+            if (edge < 0) continue;
+            v[edge] -= t * problem_->turning[static_cast<std::size_t>(edge) - 2 * inertia.size()];
+        }
         const double x = c.normal[0] * n - c.normal[1] * t;
         const double y = c.normal[1] * n + c.normal[0] * t;
         const double first = inertia[static_cast<std::size_t>(c.first)];
@@ -459,6 +388,7 @@ bool ContactLaw::begin(const LawProblem& problem, Eigen::VectorXd& p, Eigen::Vec
 {
     problem_ = &problem;
     stiffness_ = stiff;
+    set_units();
     const auto n = 2 * static_cast<Eigen::Index>(problem.contacts.size());
     factor_inertia();
     Eigen::VectorXd zero = Eigen::VectorXd::Zero(n);
@@ -482,27 +412,38 @@ bool ContactLaw::begin(const LawProblem& problem, Eigen::VectorXd& p, Eigen::Vec
 }
 
 /// The contacts of a problem whose A is diagonal. A wall is a body of infinite mass, beyond the
-/// last one.
+/// last one, as is an edge that does not turn.
 void ContactLaw::lay_rows()
 {
     rows_.clear();
     const auto& inertia = problem_->inertia;
-    for (const LawContact& c : problem_->contacts) {
+    const Eigen::Index beyond = problem_->momentum.size();
+    for (std::size_t k = 0; k < problem_->contacts.size(); ++k) {
+        const LawContact& c = problem_->contacts[k];
         const bool wall = c.second < 0;
         rows_.push_back({.first = 2 * c.first,
-                         .second = wall ? problem_->momentum.size() : 2 * c.second,
+                         .second = wall ? beyond : 2 * c.second,
                          .nx = c.normal[0],
                          .ny = c.normal[1],
                          .offset_n = c.offset[0],
                          .offset_t = c.offset[1],
                          .friction = c.friction,
-                         .mass = unit(c),
+                         .mass = units_[k].normal,
                          .by_first = 1 / inertia[static_cast<std::size_t>(c.first)],
-                         .by_second = wall ? 0 : 1 / inertia[static_cast<std::size_t>(c.second)]});
+                         .by_second = wall ? 0 : 1 / inertia[static_cast<std::size_t>(c.second)],
+                         .edges = {beyond + 2, beyond + 2},
+                         .mass_across = units_[k].tangential});
+        for (std::size_t side = 0; side < 2; ++side) {
+            if (c.edges[side] < 0) continue;
+            const std::size_t body = static_cast<std::size_t>(c.edges[side]) - 2 * inertia.size();
+            rows_.back().edges[side] = c.edges[side];
+            rows_.back().by_edges[side] = problem_->turning[body];
+        }
     }
 }
 
-/// As `sweep`; v has the velocity of walls, which is zero, at its end.
+/// As `sweep`; v has the velocity of walls and of their edges, which is zero, at its end.
+template <bool turns>
 void ContactLaw::sweep_rows(Eigen::VectorXd& p, Eigen::VectorXd& v) const
 {
     double* impulse = p.data();
@@ -512,10 +453,12 @@ void ContactLaw::sweep_rows(Eigen::VectorXd& p, Eigen::VectorXd& v) const
         const double x = a[0] - b[0];
         const double y = a[1] - b[1];
         const double u_n = c.nx * x + c.ny * y + c.offset_n;
-        const double u_t = c.nx * y - c.ny * x + c.offset_t;
+        double u_t = c.nx * y - c.ny * x + c.offset_t;
+        if constexpr (turns) u_t -= v[c.edges[0]] + v[c.edges[1]];
         const double normal = std::max(0.0, impulse[0] - c.mass * u_n);
         const double bound = c.friction * normal;
-        const double tangential = std::clamp(impulse[1] - c.mass * u_t, -bound, bound);
+        const double across = turns ? c.mass_across : c.mass;
+        const double tangential = std::clamp(impulse[1] - across * u_t, -bound, bound);
         const double n = normal - impulse[0];
         const double t = tangential - impulse[1];
         impulse[0] = normal, impulse[1] = tangential;
@@ -526,6 +469,10 @@ void ContactLaw::sweep_rows(Eigen::VectorXd& p, Eigen::VectorXd& v) const
         a[1] += c.by_first * push_y;
         b[0] -= c.by_second * push_x;
         b[1] -= c.by_second * push_y;
+        if constexpr (turns) {
+            v[c.edges[0]] -= c.by_edges[0] * t;
+            v[c.edges[1]] -= c.by_edges[1] * t;
+        }
     }
 }
 
@@ -538,8 +485,9 @@ LawReport ContactLaw::settle(const LawProblem& problem, Eigen::VectorXd& p, Eige
     if (diagonal) lay_rows();
     for (int batch = first_batch; report.residual > enough && batch < last_batch; batch *= 2) {
         if (diagonal) {
-            v.conservativeResizeLike(Eigen::VectorXd::Zero(problem.momentum.size() + 2));
-            for (int k = 0; k < batch; ++k) sweep_rows(p, v);
+            v.conservativeResizeLike(Eigen::VectorXd::Zero(problem.momentum.size() + 3));
+            for (int k = 0; k < batch; ++k)
+                turns() ? sweep_rows<true>(p, v) : sweep_rows<false>(p, v);
             follow(p, v);
         } else {
             relax(p, v, batch);

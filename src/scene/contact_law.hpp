@@ -5,8 +5,11 @@
 //
 // with two coordinates per body. A is diagonal, except for couplings by springs and dampers; it is
 // never inverted as a matrix, and W = G A^-1 G' is not formed: the equations are solved for
-// velocities, which are fewer than impulses where contacts are redundant. A contact with one more
-// row for a spin would change only `LawContact` and the products with G.
+// velocities, which are fewer than impulses where contacts are redundant.
+//
+// Where discs turn, v has one more coordinate for each body after all these: the speed r w [m/s] of
+// its edge, counterclockwise, with the inertia I / r^2 [kg]. It is subtracted from u_t in each
+// contact of the disc, so that u_t is the slip of edges.
 #pragma once
 
 #include <Eigen/Dense>
@@ -26,6 +29,7 @@ struct LawContact {
     std::array<double, 2> normal{};  ///< of length 1, towards `first`
     std::array<double, 2> offset{};  ///< of the relative velocity, normal and tangential [m/s]
     double friction = 0;
+    std::array<int, 2> edges{-1, -1};  ///< places in v of the speeds of edges that turn
 };
 
 /// A symmetric, positive semidefinite block of A that resists the relative velocity of two bodies.
@@ -37,9 +41,11 @@ struct LawCoupling {
 
 struct LawProblem {
     std::vector<double> inertia;  ///< [kg] of each body, positive
+    /// [1/kg] r^2 / I of each body, 0 where it does not turn; empty where no body does.
+    std::vector<double> turning{};
     std::vector<LawCoupling> couplings;
     std::vector<LawContact> contacts;
-    Eigen::VectorXd momentum;  ///< b [kg m/s], two for each body
+    Eigen::VectorXd momentum;  ///< b [kg m/s], of the size of v
 };
 
 struct LawReport {
@@ -92,7 +98,8 @@ private:
     using Sparse = Eigen::SparseMatrix<double>;
 
     static void push(const LawContact& c, double normal, double tangential, Eigen::VectorXd& b);
-    [[nodiscard]] double unit(const LawContact& c) const;
+    void set_units();
+    [[nodiscard]] Pair rho(std::size_t k) const;
 
     bool begin(const LawProblem& problem, Eigen::VectorXd& p, Eigen::VectorXd& v,
                LawReport& report);
@@ -113,6 +120,7 @@ private:
     void confine(Eigen::VectorXd& p) const;
     void sweep(Eigen::VectorXd& p, Eigen::VectorXd& v);
     void lay_rows();
+    template <bool turns>
     void sweep_rows(Eigen::VectorXd& p, Eigen::VectorXd& v) const;
     bool along_paths(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport& report);
     void begin_path(const Eigen::VectorXd& p, const Eigen::VectorXd& v);
@@ -128,22 +136,33 @@ private:
     void pass(const Switch& next);
     void impulses_of_path(Eigen::VectorXd& p) const;
     void solve_densely(Eigen::VectorXd& p, Eigen::VectorXd& v, LawReport& report);
-    void add_entries(int a, int b, const BlockLu::Block& block);
+    [[nodiscard]] bool turns() const noexcept { return !problem_->turning.empty(); }
+    void add_entries(int a, int b, const BlockLu<2>::Block& block);
+    void collect_entries();
+    [[nodiscard]] bool factor_blocks();
     template <class Add>
     std::size_t assemble_inertia(const Add& add) const;
     template <class Add>
     void assemble(const Add& add) const;
+    template <class Add>
+    void assemble_turning(const Add& add) const;
+    [[nodiscard]] double inertia_of_edge(std::size_t body) const;
 
     double tolerance_;
     const LawProblem* problem_ = nullptr;
     double scale_ = 0;
     double stiffness_ = 1e5;
+    /// [kg] Effective inertia of the bodies at each contact, along the normal and across, without
+    /// springs.
+    std::vector<Pair> units_;
     Eigen::SimplicialLDLT<Sparse> inertia_factor_;
     std::vector<Active> active_, chosen_;
     std::vector<Eigen::Triplet<double>> triplets_;
     std::vector<std::array<int, 2>> pattern_;
     int pattern_count_ = 0;
-    BlockLu block_lu_;
+    bool pattern_turns_ = false;
+    BlockLu<2> block_lu_;
+    BlockLu<3> turning_lu_;
     bool blocked_ = true;
     Sparse sparse_;
     Eigen::SparseLU<Sparse> sparse_lu_;
@@ -153,6 +172,10 @@ private:
         Eigen::Index first = 0, second = 0;
         double nx = 0, ny = 0, offset_n = 0, offset_t = 0, friction = 0;
         double mass = 0, by_first = 0, by_second = 0;
+        /// Of the edges, where a disc turns.
+        std::array<Eigen::Index, 2> edges{};
+        std::array<double, 2> by_edges{};
+        double mass_across = 0;
     };
     std::vector<Row> rows_;
     struct Path {

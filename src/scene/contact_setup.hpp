@@ -18,6 +18,8 @@ struct IslandBody {
     double mass = 1;                   ///< [kg]
     double radius = 0;                 ///< [m]
     double drag = 0;                   ///< [kg/s]
+    double inertia = 0;                ///< [kg m^2] about the centre, 0 where it does not turn
+    double spin = 0;                   ///< [rad/s] counterclockwise
     std::uint32_t material = 0;
     std::uint32_t patience = 1;  ///< steps without contact after which it is handed back
 };

@@ -58,6 +58,10 @@ IslandSetup Contacts::setup_of(const std::vector<std::uint32_t>& members,
                                 .radius = disc.radius,
                                 .drag = disc.drag,
                                 .material = body.material});
+        if (world_.turning(i)) {
+            setup.bodies.back().inertia = disc.inertia;
+            setup.bodies.back().spin = world_.turns[i].spin;
+        }
         if (body.island != none) islands.push_back(body.island);
     }
     std::ranges::sort(islands);
@@ -157,6 +161,7 @@ std::uint32_t Contacts::join(std::vector<std::uint32_t> members, std::vector<std
         body.asleep = false;
         ++body.version;
         world_.drifts[i] = {states[k][1], {}};
+        if (world_.turning(i)) world_.set_spin(i, now, world_.spin(i, now));
     }
     IslandSetup setup = setup_of(members, faces);
     for (std::size_t k = 0; k < members.size(); ++k) setup.bodies[k].patience = patience[k];
@@ -214,8 +219,19 @@ IslandOutcome Contacts::plan(std::uint32_t which, const Instant& now, const Inst
         ++body.version;
         const Vector2 v = state.velocity;
         world_.drifts[i] = {v, moves ? (1 / step) * (body.v - v) : Vector2{}};
+        if (world_.turning(i)) plan_turn(i, group, moves ? step : 0);
     }
     return outcome;
+}
+
+/// Sets the record of the angle of a disc in a planned step of this length, 0 where it does not
+/// move.
+void Contacts::plan_turn(std::uint32_t i, const Group& group, double step)
+{
+    const double spin = group.motion->body(i).spin;
+    const double chord = step > 0 ? group.motion->chord_spin(i) : spin;
+    world_.set_spin(i, group.start, spin, step > 0 ? (chord - spin) / step : 0);
+    world_.turns[i].chord = chord;
 }
 
 void Contacts::commit(std::uint32_t which, const Instant& now)
@@ -237,6 +253,7 @@ void Contacts::commit(std::uint32_t which, const Instant& now)
         body.v = {};
         body.t = now;
         world_.drifts[i] = {state.velocity, {}};
+        if (world_.turning(i)) world_.set_spin(i, now, state.spin);
     }
 }
 

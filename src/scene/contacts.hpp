@@ -43,6 +43,10 @@ public:
     {
         groups_[group]->motion->set_velocity(body, v);
     }
+    void set_spin(std::uint32_t group, std::uint32_t body, double spin)
+    {
+        groups_[group]->motion->set_spin(body, spin);
+    }
     /// Counts an impact that cuts a step of a group; true where it makes it a crowd.
     bool crowds(std::uint32_t group, const Instant& now);
     /// Whether a crowd is still one after another step.
@@ -79,6 +83,7 @@ private:
                                        const std::vector<std::uint32_t>& faces) const;
     void set_motions(IslandSetup& setup, Group& group, const Instant& now) const;
     [[nodiscard]] double largest_overlap(const Group& group) const;
+    void plan_turn(std::uint32_t i, const Group& group, double step);
     static void leave_crowd(Group& group);
 
     World& world_;

@@ -55,6 +55,7 @@ struct TurningBody {
     double spin = 0;             ///< [rad/s]
     double inverse_inertia = 0;  ///< [1/(kg m^2)]
     double radius = 0;           ///< [m]
+    double before = 0;           ///< [rad/s] the spin before
 };
 
 struct Cluster {
@@ -68,6 +69,12 @@ struct Cluster {
     double fastest = 0;                    ///< [m/s] the largest speed before
     std::vector<TurningBody> turning;      ///< of bodies, where a disc turns
     bool lasting = false;                  ///< whether one of the bodies is in lasting contact
+
+    /// Whether the spin of a body has changed.
+    [[nodiscard]] bool turned(std::size_t slot) const noexcept
+    {
+        return !turning.empty() && turning[slot].spin != turning[slot].before;
+    }
 
     void clear()
     {

@@ -34,9 +34,12 @@ public:
     virtual void commit(double s) = 0;
     /// Velocity [m/s] of the straight line of a body in the planned step.
     [[nodiscard]] virtual std::array<double, 2> chord(std::uint32_t id) const = 0;
+    /// [rad/s] Rate of the angle of a body in the planned step.
+    [[nodiscard]] virtual double chord_spin(std::uint32_t id) const = 0;
     [[nodiscard]] virtual IslandBody body(std::uint32_t id) const = 0;
     virtual void set_crowded(bool crowded) = 0;
     virtual void set_velocity(std::uint32_t id, const std::array<double, 2>& velocity) = 0;
+    virtual void set_spin(std::uint32_t id, double spin) = 0;
     /// Bodies grouped by springs and by contacts that push.
     [[nodiscard]] virtual std::vector<std::vector<std::uint32_t>> groups() const = 0;
     /// Contacts that pushed in the last step.

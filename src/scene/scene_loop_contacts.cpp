@@ -132,14 +132,6 @@ bool SceneLoop::can_last(const std::vector<std::uint32_t>& members,
                          const std::vector<std::uint32_t>& bodies)
 {
     for (const std::uint32_t i : members) {
-        if (!world_.turning(i)) continue;
-        fail(Outcome::zeno, bodies,
-             fmt::format("{} is in lasting contact, which of discs that turn is followed on "
-                         "surfaces alone",
-                         called(i)));
-        return false;
-    }
-    for (const std::uint32_t i : members) {
         if (!world_.bodies[i].mapped) continue;
         fail(Outcome::zeno, bodies,
              fmt::format("{} is in lasting contact, which of systems is not followed", called(i)));
@@ -230,7 +222,7 @@ std::vector<std::uint32_t> SceneLoop::with_arriving(std::vector<std::uint32_t> m
         const Vector2 v = world_.velocity(i, now_);
         grid_.each_near(world_.bodies, i, pending_[i].cell, [&](std::uint32_t j) {
             const Body& other = world_.bodies[j];
-            if (known[j] || other.mapped || world_.turning(j)) return;
+            if (known[j] || other.mapped) return;
             const double reach = world_.bodies[i].radius + other.radius;
             if (reach == 0) return;
             const double gap = norm(p - world_.position(j, now_)) - reach;
@@ -315,8 +307,11 @@ void SceneLoop::restart_group(std::uint32_t number)
     contacts_.commit(number, now_);
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
         const std::uint32_t i = cluster_.bodies[k];
-        if (world_.bodies[i].contact != number || cluster_.after[k] == cluster_.before[k]) continue;
+        if (world_.bodies[i].contact != number) continue;
+        const bool turned = cluster_.turned(k);
+        if (cluster_.after[k] == cluster_.before[k] && !turned) continue;
         contacts_.set_velocity(number, i, cluster_.after[k]);
+        if (turned) contacts_.set_spin(number, i, cluster_.turning[k].spin);
         world_.bodies[i].asleep = false;
     }
     for (const std::uint32_t i : contacts_[number].members) world_.bodies[i].asleep = false;

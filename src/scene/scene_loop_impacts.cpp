@@ -59,8 +59,9 @@ void SceneLoop::gather(std::uint32_t i, const Pending& seed)
     if (!world_.plates.empty()) couple_plates();
     if (world_.any_turning) {
         for (const std::uint32_t body : cluster_.bodies) {
-            cluster_.turning.push_back({world_.spin(body, now_), world_.turns[body].inverse_inertia,
-                                        world_.bodies[body].radius});
+            const double spin = world_.spin(body, now_);
+            cluster_.turning.push_back(
+                {spin, world_.turns[body].inverse_inertia, world_.bodies[body].radius, spin});
         }
     }
     for (const std::uint32_t body : cluster_.bodies) slots_[body] = none;
@@ -457,13 +458,13 @@ std::uint32_t SceneLoop::begin_record(std::uint32_t i, const Vector2& velocity,
     return std::exchange(body.held, none);
 }
 
-/// Lets discs turn with the spins that impacts have given them.
+/// Lets discs turn with the spins that impacts have given them; `restart_group` does it in groups.
 void SceneLoop::set_spins()
 {
     for (std::size_t k = 0; k < cluster_.turning.size(); ++k) {
         const std::uint32_t i = cluster_.bodies[k];
-        const double spin = cluster_.turning[k].spin;
-        if (spin != world_.spin(i, now_)) world_.set_spin(i, now_, spin);
+        const bool own = world_.bodies[i].contact == none;
+        if (own && cluster_.turned(k)) world_.set_spin(i, now_, cluster_.turning[k].spin);
     }
 }
 
@@ -477,8 +478,9 @@ void SceneLoop::apply(bool struck)
     groups_struck_.clear();
     set_spins();
     for (std::size_t k = 0; k < cluster_.bodies.size(); ++k) {
-        if (cluster_.after[k] == cluster_.before[k]) continue;
         const std::uint32_t i = cluster_.bodies[k];
+        const bool turned = world_.bodies[i].contact != none && cluster_.turned(k);
+        if (cluster_.after[k] == cluster_.before[k] && !turned) continue;
         changed_.push_back(i);
         Body& body = world_.bodies[i];
         series_[i].last = now_;

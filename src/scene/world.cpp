@@ -76,7 +76,7 @@ World::World(const Scene& from, const SceneOptions& with)
     if (std::ranges::any_of(from.bodies(), turns_itself)) {
         for (const Disc& disc : from.bodies()) {
             const double inverse = disc.inertia > 0 ? 1 / disc.inertia : 0;
-            turns.push_back({start, disc.angle, disc.spin, 0, inverse});
+            turns.push_back({start, disc.angle, disc.spin, 0, inverse, {}});
         }
     }
     for (const bool walls : {true, false}) {

@@ -178,6 +178,7 @@ struct World {
         double spin = 0;
         double rate = 0;  ///< [rad/s^2] while friction turns it on a surface
         double inverse_inertia = 0;
+        std::optional<double> chord{};  ///< [rad/s] of the angle, in a step of lasting contact
     };
     /// A plate, and the sides of it on which bodies without a radius are.
     struct Plate {
@@ -242,7 +243,8 @@ struct World {
     {
         const Turn& turn = turns[i];
         const double s = seconds(turn.t, t);
-        return {turn.angle + s * (turn.spin + 0.5 * s * turn.rate), turn.spin + s * turn.rate};
+        const double mean = turn.chord ? *turn.chord : turn.spin + 0.5 * s * turn.rate;
+        return {turn.angle + s * mean, turn.spin + s * turn.rate};
     }
     /// Lets a disc turn with this spin from t on.
     void set_spin(std::uint32_t i, const Instant& t, double spin, double rate = 0) noexcept
@@ -251,6 +253,7 @@ struct World {
         turns[i].t = t;
         turns[i].spin = spin;
         turns[i].rate = rate;
+        turns[i].chord.reset();
     }
     /// [m/s] Speed at which the edge of a disc on a face slips along it, counterclockwise about the
     /// side from which the face pushes.
