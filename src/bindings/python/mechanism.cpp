@@ -11,6 +11,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "mechanism_flights.hpp"
 #include "numbers.hpp"
 #include "ricochet/detail/system_adapter.hpp"
 #include "ricochet/nonsmooth/detail/contact_run.hpp"
@@ -26,14 +27,30 @@ namespace {
 }
 
 /// The functions of a mechanism of n coordinates, called with arrays.
-class Calls {
+class Calls final : public MechanismCalls {
 public:
     Calls(const MechanismDescription& of, std::size_t n) : of_(of), n_(n) {}
 
-    [[nodiscard]] const MechanismDescription& of() const noexcept { return of_; }
+    [[nodiscard]] std::size_t contacts() const noexcept override { return of_.contacts; }
+    [[nodiscard]] std::size_t components_of_each() const noexcept override
+    {
+        return 1 + of_.tangents;
+    }
+    [[nodiscard]] bool surfaces_move() const noexcept override { return bool(of_.surface_rates); }
+    [[nodiscard]] double restitution(std::size_t contact) const override
+    {
+        return of_.restitution[contact];
+    }
+    [[nodiscard]] double friction(std::size_t contact) const override
+    {
+        return of_.friction[contact];
+    }
+    [[nodiscard]] double dry_friction(std::size_t coordinate) const override
+    {
+        return of_.dry_friction.empty() ? 0 : of_.dry_friction[coordinate];
+    }
 
-    /// Writes n x n numbers by rows.
-    void mass(const double* q, double* rows)
+    void mass(const double* q, double* rows) override
     {
         if (!of_.mass) {
             std::ranges::copy(of_.constant_mass, rows);
@@ -42,43 +59,37 @@ public:
         const Ref result = call(of_.mass, {show(q_, q)});
         read_matrix(result.get(), "mass", {n_, n_}, rows);
     }
-    void force(const detail::MechanismAt& at, const double* q, const double* v, double* f)
+    void force(Mode mode, double t, const double* q, const double* v, double* f) override
     {
-        const Ref time = checked(PyFloat_FromDouble(at.t));
+        const Ref time = checked(PyFloat_FromDouble(t));
         PyObject* const position = show(q_, q);
         PyObject* const velocity = show(v_, v);
         Ref result;
         if (of_.modes) {
-            PyObject* const mode = PyList_GetItem(of_.modes.get(), at.mode);  // borrowed
-            if (!mode) throw PythonError();
-            result = call(of_.force, {mode, time.get(), position, velocity});
+            PyObject* const shown = PyList_GetItem(of_.modes.get(), mode);  // borrowed
+            if (!shown) throw PythonError();
+            result = call(of_.force, {shown, time.get(), position, velocity});
         } else {
             result = call(of_.force, {time.get(), position, velocity});
         }
         read(result.get(), "force", n_, f);
     }
-    void gaps(double t, const double* q, double* g)
+    void gaps(double t, const double* q, double* g) override
     {
         if (of_.contacts == 0) return;
         const Ref result = call_at(of_.gaps, of_.timed_gaps, t, q);
         read(result.get(), "gaps", of_.contacts, g);
     }
-    /// Writes a row of n numbers for each component of each contact.
-    void directions(double t, const double* q, double* rows)
+    void directions(double t, const double* q, double* rows) override
     {
         if (of_.contacts == 0) return;
         const Ref result = call_at(of_.directions, of_.timed_directions, t, q);
         read_matrix(result.get(), "directions", {components(), n_}, rows);
     }
-    void surface_rates(double t, const double* q, double* b)
+    void surface_rates(double t, const double* q, double* b) override
     {
         const Ref result = call_at(of_.surface_rates, true, t, q);
         read(result.get(), "surface_rates", components(), b);
-    }
-    /// Number of components of all contacts.
-    [[nodiscard]] std::size_t components() const noexcept
-    {
-        return of_.contacts * (1 + of_.tangents);
     }
 
 private:
@@ -115,190 +126,13 @@ private:
     State shown_;
 };
 
-template <int N>
-class CalledMechanism final : public detail::AnyMechanism<N> {
-    using Any = detail::AnyMechanism<N>;
-    using Vector = typename Any::Vector;
-
-public:
-    explicit CalledMechanism(Calls& calls)
-        : Any(static_cast<int>(calls.of().contacts), static_cast<int>(1 + calls.of().tangents),
-              bool(calls.of().surface_rates)),
-          calls_(&calls)
-    {
-    }
-
-    [[nodiscard]] std::unique_ptr<const Any> clone() const override
-    {
-        return std::make_unique<CalledMechanism>(*calls_);
-    }
-    void mass(const Vector& q, typename Any::Square& m) const override
-    {
-        std::array<double, static_cast<std::size_t>(N * N)> rows;
-        calls_->mass(q.data(), rows.data());
-        const double* next = rows.data();
-        for (int i = 0; i < N; ++i) {
-            for (int j = 0; j < N; ++j) m(i, j) = *next++;
-        }
-    }
-    void force(detail::MechanismAt at, const Vector& q, const Vector& v, Vector& f) const override
-    {
-        calls_->force(at, q.data(), v.data(), f.data());
-    }
-    void acceleration(detail::MechanismAt at, const Vector& q, const Vector& v,
-                      Vector& a) const override
-    {
-        typename Any::Square m;
-        Vector f;
-        mass(q, m);
-        force(at, q, v, f);
-        a = m.llt().solve(f);
-    }
-    void gaps(double t, const Vector& q, typename Any::Gaps& g) const override
-    {
-        g.resize(this->contacts);
-        calls_->gaps(t, q.data(), g.data());
-    }
-    void directions(double t, const Vector& q, typename Any::Directions& h) const override
-    {
-        std::vector<double> rows(calls_->components() * static_cast<std::size_t>(N));
-        calls_->directions(t, q.data(), rows.data());
-        h.resize(static_cast<Eigen::Index>(calls_->components()), N);
-        const double* next = rows.data();
-        for (Eigen::Index i = 0; i < h.rows(); ++i) {
-            for (int j = 0; j < N; ++j) h(i, j) = *next++;
-        }
-    }
-    void surface_rates(double t, const Vector& q, Eigen::VectorXd& b) const override
-    {
-        b.resize(static_cast<Eigen::Index>(calls_->components()));
-        calls_->surface_rates(t, q.data(), b.data());
-    }
-    [[nodiscard]] double gap(int contact, double t, const Vector& q) const override
-    {
-        typename Any::Gaps all;
-        gaps(t, q, all);
-        return all[contact];
-    }
-    [[nodiscard]] double gap_rate(int contact, double t, const Vector& q,
-                                  const Vector& v) const override
-    {
-        typename Any::Directions all;
-        directions(t, q, all);
-        double rate = all.row(contact * this->components).dot(v);
-        if (!this->moves) return rate;
-        Eigen::VectorXd rates;
-        surface_rates(t, q, rates);
-        return rate + rates[contact * this->components];
-    }
-    [[nodiscard]] double restitution(int contact) const override
-    {
-        return calls_->of().restitution[static_cast<std::size_t>(contact)];
-    }
-    [[nodiscard]] double friction(int contact) const override
-    {
-        return calls_->of().friction[static_cast<std::size_t>(contact)];
-    }
-    [[nodiscard]] double dry_friction(int coordinate) const override
-    {
-        const auto& all = calls_->of().dry_friction;
-        return all.empty() ? 0 : all[static_cast<std::size_t>(coordinate)];
-    }
-
-private:
-    Calls* calls_;
-};
-
-/// The flight of a mechanism of any number of coordinates.
-class AnyFlight {
-public:
-    AnyFlight() = default;
-    AnyFlight(const AnyFlight&) = delete;
-    AnyFlight& operator=(const AnyFlight&) = delete;
-    virtual ~AnyFlight() = default;
-
-    [[nodiscard]] virtual const detail::FlightKinds& kinds() const noexcept = 0;
-    /// Components of the state: velocities under dry friction.
-    [[nodiscard]] virtual std::vector<std::size_t> dry() const = 0;
-    virtual void accelerate(Mode mode, double t, const State& x, State& dxdt) const = 0;
-    [[nodiscard]] virtual double gap(std::size_t contact, double t, const State& x) const = 0;
-    [[nodiscard]] virtual double gap_rate(std::size_t contact, double t, const State& x) const = 0;
-    virtual void collide(std::span<const std::size_t> closed, double t, State& x) const = 0;
-    [[nodiscard]] virtual detail::Owner<detail::ContactSteps> steps() const = 0;
-    virtual void check_start(double t, const State& x) const = 0;
-};
-
-template <int N>
-class FlightOf final : public AnyFlight {
-    using Flight = detail::AnyFlight<N>;
-    using Fixed = typename Flight::State;
-
-public:
-    explicit FlightOf(Calls& calls) : flight_(CalledMechanism<N>(calls)) {}
-
-    [[nodiscard]] const detail::FlightKinds& kinds() const noexcept override
-    {
-        return flight_.kinds();
-    }
-    [[nodiscard]] std::vector<std::size_t> dry() const override
-    {
-        std::vector<std::size_t> out;
-        for (std::size_t k = 0; k < kinds().dry(); ++k) {
-            out.push_back(static_cast<std::size_t>(N + flight_.dry()[k].coordinate));
-        }
-        return out;
-    }
-    void accelerate(Mode mode, double t, const State& x, State& dxdt) const override
-    {
-        Fixed rate;
-        flight_.accelerate(mode, t, fixed(x), rate);
-        dxdt.assign(rate.begin(), rate.end());
-    }
-    [[nodiscard]] double gap(std::size_t contact, double t, const State& x) const override
-    {
-        return flight_.gap(contact, t, fixed(x));
-    }
-    [[nodiscard]] double gap_rate(std::size_t contact, double t, const State& x) const override
-    {
-        return flight_.gap_rate(contact, t, fixed(x));
-    }
-    void collide(std::span<const std::size_t> closed, double t, State& x) const override
-    {
-        Fixed state = fixed(x);
-        flight_.collide(closed, t, state);
-        x.assign(state.begin(), state.end());
-    }
-    [[nodiscard]] detail::Owner<detail::ContactSteps> steps() const override
-    {
-        return detail::Owner<detail::ContactSteps>(
-            new detail::ContactStepsOf<N>(flight_.mechanism()));
-    }
-    void check_start(double t, const State& x) const override
-    {
-        const Fixed state = fixed(x);
-        detail::check_start(flight_.mechanism(), t, Flight::position(state),
-                            Flight::velocity(state));
-    }
-
-private:
-    [[nodiscard]] static Fixed fixed(const State& x)
-    {
-        Fixed out;
-        std::copy_n(x.begin(), out.size(), out.begin());
-        return out;
-    }
-
-    Flight flight_;
-};
-
-[[nodiscard]] std::unique_ptr<AnyFlight> make_flight(Calls& calls, std::size_t n)
+[[nodiscard]] std::unique_ptr<MechanismFlight> flight_of_size(MechanismCalls& calls, std::size_t n)
 {
-    std::unique_ptr<AnyFlight> out;
+    std::unique_ptr<MechanismFlight> out;
     const auto make = [&]<std::size_t... i>(std::index_sequence<i...>)
     {
         static_cast<void>(
-            ((n == i + 1 && (out = std::make_unique<FlightOf<static_cast<int>(i + 1)>>(calls))) ||
-             ...));
+            ((n == i + 1 && (out = make_flight<static_cast<int>(i + 1)>(calls))) || ...));
     };
     make(std::make_index_sequence<most_coordinates>());
     return out;
@@ -312,7 +146,7 @@ public:
     static constexpr bool forward_only = true;
     using State = python::State;
 
-    PlainFlight(const AnyFlight& of, std::size_t contacts, RunAdapter& beside)
+    PlainFlight(const MechanismFlight& of, std::size_t contacts, RunAdapter& beside)
         : name(beside.table().name(beside.adapter())),
           of_(&of),
           beside_(&beside),
@@ -404,7 +238,7 @@ protected:
         return beside_->table();
     }
     [[nodiscard]] void* at() const noexcept { return beside_->adapter(); }
-    [[nodiscard]] const AnyFlight& of() const noexcept { return *of_; }
+    [[nodiscard]] const MechanismFlight& of() const noexcept { return *of_; }
     [[nodiscard]] bool is_own(std::size_t which) const noexcept
     {
         return which >= contacts_ && which < event_guards();
@@ -446,7 +280,7 @@ private:
         return mode;
     }
 
-    const AnyFlight* of_;
+    const MechanismFlight* of_;
     RunAdapter* beside_;
     std::size_t contacts_;
     std::size_t own_guards_;
@@ -539,7 +373,7 @@ public:
                      const State& x0)
         : beside_(std::move(beside)),
           calls_(of, x0.size() / 2),
-          any_(make_flight(calls_, x0.size() / 2)),
+          any_(flight_of_size(calls_, x0.size() / 2)),
           flight_(*any_, of.contacts, *beside_),
           adapter_(flight_, x0),
           table_(table_of<Flight>(beside_->table()))
@@ -578,7 +412,7 @@ public:
 private:
     std::unique_ptr<RunAdapter> beside_;
     Calls calls_;
-    std::unique_ptr<AnyFlight> any_;
+    std::unique_ptr<MechanismFlight> any_;
     Flight flight_;
     detail::SystemAdapter<Flight, State> adapter_;
     detail::SystemTable<State> table_;
