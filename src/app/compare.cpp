@@ -64,7 +64,7 @@ struct Method {
     Timing timing{};
 };
 
-/// Every detector in fixed steps and under error control, and Taylor series where they apply.
+/// Detectors in fixed steps and under error control, and Taylor series where they apply.
 class MethodList {
 public:
     MethodList(const SystemEntry& system, const std::vector<std::string>& set)

@@ -78,7 +78,7 @@ struct SystemDescriptor {
     std::vector<std::string_view> events;  ///< on the surfaces of the guards, by their numbers
     std::string_view guard_name{};         ///< of a guard that declares none
     double t_end;                          ///< [s] of a run that shows it
-    double comparison_step = 0;            ///< [s] of fixed steps in a comparison
+    double comparison_step = 0;            ///< [s] of fixed steps in a comparison; with event_times
 
     std::vector<KnownFunction> known{};
     std::vector<std::pair<std::string_view, double>> constants{};  ///< for the default parameters
