@@ -31,14 +31,13 @@ namespace {
 
 using ricochet::python::ReadyDescription;
 
-using Numbers = std::vector<double>;
+using Values = std::vector<double>;
 
 /// The values of a formula, by the interpreter or by code; nothing where no code is made.
-std::optional<Numbers> values_of(const ricochet::python::ModedFormula& of, double t,
-                                 const Numbers& x, std::size_t count, bool by_code,
-                                 const Numbers& parameters)
+std::optional<Values> values_of(const ricochet::python::ModedFormula& of, double t, const Values& x,
+                                std::size_t count, bool by_code, const Values& parameters)
 {
-    Numbers out(count), scratch;
+    Values out(count), scratch;
     const ricochet::python::Formula& formula = of.in(0);
     if (!by_code) {
         formula.evaluate(t, x, parameters.data(), out, scratch);
@@ -51,15 +50,15 @@ std::optional<Numbers> values_of(const ricochet::python::ModedFormula& of, doubl
 }
 
 /// The coefficients of a flow and of a guard, likewise.
-std::optional<std::pair<Numbers, Numbers>> series_of(const ricochet::python::ModedFormula& flow,
-                                                     const ricochet::python::ModedFormula& guard,
-                                                     double t, const Numbers& x, int order,
-                                                     bool by_code)
+std::optional<std::pair<Values, Values>> series_of(const ricochet::python::ModedFormula& flow,
+                                                   const ricochet::python::ModedFormula& guard,
+                                                   double t, const Values& x, int order,
+                                                   bool by_code)
 {
     const ricochet::python::FormulaSeries series(flow, {&guard});
     ricochet::detail::LazyTape tape = series.tape(0, "formula");
     constexpr std::size_t rows = ricochet::detail::most_taylor_order + 1;
-    Numbers out(rows * x.size()), guards(rows);
+    Values out(rows * x.size()), guards(rows);
     if (!by_code) {
         tape.compute(t, x.data(), {order, out.data(), guards.data()});
     } else {
@@ -213,7 +212,7 @@ PYBIND11_MODULE(_ricochet, module)
              py::arg("components"), py::arg("modes"),
              py::arg("following") = std::vector<std::uint32_t>())
         .def("values", &values_of, py::arg("t"), py::arg("x"), py::arg("count"), py::arg("by_code"),
-             py::arg("parameters") = Numbers())
+             py::arg("parameters") = Values())
         .def("rate",
              [](const ModedFormula& self) { return std::make_shared<ModedFormula>(self.rate()); })
         .def("series", &series_of)
