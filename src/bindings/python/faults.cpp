@@ -346,7 +346,6 @@ void jacobian_of(std::uint32_t /*mode*/, double t, const double* x, double* rows
 
 }  // namespace
 
-// Long: a list of what the module has.
 PYBIND11_MODULE(_faults, module)
 {
     py::register_exception_translator([](std::exception_ptr thrown) {
