@@ -74,12 +74,11 @@ public:
     [[nodiscard]] bool passes_once(const Modes& modes, const Step& step, const Vector& rate,
                                    const Rooms& rooms)
     {
-        const bool is_like_the_last = begin(modes, step) && step.h() <= 2 * length_;
+        begin(modes, step);
         End end{step.t1, step.mode, rate, rooms, {}};
         find_change(modes, step.t1, step.w1, -step.h(), end);
         std::array<bool, std::tuple_size_v<Rooms>> beyond{};
         for (const double s : {0.13711, 0.38196601125010515, 0.78934, 1.0}) {
-            if (is_like_the_last && s != 0.38196601125010515 && s < 1) continue;
             if (s < 1) go_inside(modes, step, end.rate, s);
             const Rooms& here = s < 1 ? rooms_ : rooms;
             for (std::size_t k = 0; k < here.size(); ++k) {
